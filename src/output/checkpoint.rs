@@ -26,7 +26,7 @@ const NAMES: [&str; 2] = ["checkpoint_0.h5", "checkpoint_1.h5"];
 const PART: &str = "checkpoint.part";
 
 /// Version of the file layout.
-const VERSION: i64 = 11;
+const VERSION: i64 = 12;
 
 /// Test whether a path exists. A link to a missing file counts as existing, and so does a path that cannot be
 /// examined.
@@ -57,6 +57,8 @@ pub struct Header {
     /// Reference values of the history: energy at the start (J), and number of bonds that were intact
     /// before any bond could break.
     pub start: (f64, u64),
+    /// State of the checks of the energy balance, encoded as words.
+    pub energy_watch: [u64; 7],
     /// Description of the physics: the deck with all defaults or, without a deck, a listing of the problem.
     pub deck: String,
 }
@@ -92,6 +94,7 @@ struct Numbers {
     rows: u64,
     energy_at_start: f64,
     intact_at_start: u64,
+    energy_watch: [u64; 7],
     refined_nodes: u64,
     removed_nodes: u64,
     further_results: u64,
@@ -302,6 +305,7 @@ pub fn read_header(comm: &dyn Communicator, path: &Path) -> Result<Header> {
         further,
         rows: numbers.rows,
         start: (numbers.energy_at_start, numbers.intact_at_start),
+        energy_watch: numbers.energy_watch,
         deck,
     })
 }
@@ -360,6 +364,7 @@ fn write_file<const D: usize>(
         rows: header.rows,
         energy_at_start: header.start.0,
         intact_at_start: header.start.1,
+        energy_watch: header.energy_watch,
         refined_nodes: header.grids[0].len() as u64,
         removed_nodes: header.grids[1].len() as u64,
         further_results: header.further.len() as u64,

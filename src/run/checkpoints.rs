@@ -82,6 +82,7 @@ impl CheckpointWriter {
             further: recorder.further(simulation),
             rows: recorder.main().history_rows(),
             start: recorder.observer.start().unwrap_or_default(),
+            energy_watch: recorder.energy.words(),
             deck: self.physics.clone(),
         };
         self.checkpoints

@@ -78,16 +78,15 @@ pub struct EnergyWatch {
     max_freed: f64,
     /// Whether a warning about energy from breaking bonds has been printed.
     warned_of_breaking: bool,
-    /// Largest energy of the rows so far, including those before a restart, J.
+    /// Largest energy of the rows so far, J.
     largest: f64,
     /// Whether the ratio of energy gain to energy input in the previous row was above [`FATAL_GAIN`].
     suspected: bool,
 }
 
 impl EnergyWatch {
-    /// Create the watch for a run before its first step. `largest` is the largest energy of the rows before a
-    /// restart, J; 0 if there are none. Collective.
-    pub fn new<const D: usize>(simulation: &Simulation<'_, D>, largest: f64) -> Self {
+    /// Create the watch for a run before its first step. Collective.
+    pub fn new<const D: usize>(simulation: &Simulation<'_, D>) -> Self {
         let (problem, model) = (simulation.problem, &simulation.model);
         let comm: &dyn Communicator = simulation.comm;
         let mut stiffness = [ExactSum::ZERO];
@@ -102,9 +101,42 @@ impl EnergyWatch {
             warned: false,
             max_freed: 0.0,
             warned_of_breaking: false,
-            largest,
+            largest: 0.0,
             suspected: false,
         }
+    }
+
+    /// Encode the state for a checkpoint, without the round-off of the energy.
+    pub fn words(&self) -> [u64; 7] {
+        [
+            self.input.to_bits(),
+            self.gain_of_load_steps.to_bits(),
+            u64::from(self.warned),
+            self.max_freed.to_bits(),
+            u64::from(self.warned_of_breaking),
+            self.largest.to_bits(),
+            u64::from(self.suspected),
+        ]
+    }
+
+    /// Restore the state from [`Self::words`].
+    pub fn continue_from(&mut self, words: [u64; 7]) {
+        let [
+            input,
+            gain_of_load_steps,
+            warned,
+            max_freed,
+            warned_of_breaking,
+            largest,
+            suspected,
+        ] = words;
+        self.input = f64::from_bits(input);
+        self.gain_of_load_steps = f64::from_bits(gain_of_load_steps);
+        self.warned = warned == 1;
+        self.max_freed = f64::from_bits(max_freed);
+        self.warned_of_breaking = warned_of_breaking == 1;
+        self.largest = f64::from_bits(largest);
+        self.suspected = suspected == 1;
     }
 
     /// Check a row of the history, and return warnings. `simulation` must be at the time of this row.
@@ -316,6 +348,41 @@ mod tests {
         }
         let found = watch.check(&after(5.1, -5.0), &clock, 1.0, true).unwrap();
         assert!(found.unwrap().contains("grown by 2.100e0 J"));
+    }
+
+    #[test]
+    fn a_restart_keeps_the_state_of_the_checks() {
+        let row = |error: f64| {
+            row(Energies {
+                work: 1.0,
+                error,
+                ..Energies::default()
+            })
+        };
+        let restarted = |before: &EnergyWatch| {
+            let mut after = watch();
+            after.continue_from(before.words());
+            after
+        };
+        let clock = Clock::new(1.0, 1.0);
+        // The error of load steps before the restart is no gain of the time steps after it.
+        let mut before = watch();
+        before.note_load_step(&row(200.0));
+        let found = restarted(&before).check(&row(200.5), &clock, 1.0, true);
+        assert_eq!(found.unwrap(), None);
+        // The first of two rows above the fatal ratio may be before the restart.
+        let mut before = watch();
+        let warning = before.check(&row(200.0), &clock, 1.0, false).unwrap();
+        assert!(warning.is_some());
+        let mut after = restarted(&before);
+        assert!(after.check(&row(200.0), &clock, 1.0, false).is_err());
+        // The energy before the restart counts as input, and a warning is not repeated.
+        let mut before = watch();
+        before.check(&row(3.0), &clock, 1.0, false).unwrap();
+        before.largest = 10.0;
+        let mut after = restarted(&before);
+        assert_eq!(after.check(&row(3.0), &clock, 1.0, false).unwrap(), None);
+        assert_eq!((after.input, after.largest), (1.0, 10.0));
     }
 
     #[test]

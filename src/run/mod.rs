@@ -60,7 +60,6 @@ use crate::survey::Survey;
 
 use checkpoints::CheckpointWriter;
 use decisions::decisions;
-use energy_watch::{EnergyWatch, StepKinds};
 use output_file::Start;
 use recorder::{Continuation, Recorder, damage, reasons_for_new_results};
 use restart::{Restart, restart};
@@ -286,11 +285,6 @@ impl<'a> Job<'a> {
         let mut balance = BalanceWatch::new(simulation);
         let mut slow = true;
         let mut stable = simulation.scaled_stable_step();
-        // The energy input from changing temperatures is not counted, so the energy of runs with changing
-        // temperatures is not checked.
-        let is_closed = !self.problem.temperature_changes();
-        let mut energy =
-            is_closed.then(|| EnergyWatch::new(simulation, recorder.largest_past_energy()));
         while !stepper.is_over() {
             if stepper.is_refinement_due()
                 && let Some(regridded) = stepper.at_full_step().refine()?
@@ -364,15 +358,9 @@ impl<'a> Job<'a> {
                     }
                     slow = slow && !self.warn_of_inertia(stepper, recorder);
                 }
-                if let Some(row) = recorder.row_of(&clock)
-                    && let Err(error) = energy_watch::check_finite(row, &clock)
-                {
-                    recorder.write_failure(stepper.at_full_step())?;
-                    return Ok(LoopEnd::Failed(error));
-                }
-                if let (Some(energy), Some(row)) = (&mut energy, recorder.row_of(&clock)) {
+                if recorder.row_of(&clock).is_some() {
                     let simulation = stepper.at_full_step();
-                    match energy.check_row(row, simulation, complete) {
+                    match recorder.check_energy(simulation, complete) {
                         Ok(texts) => {
                             for text in texts {
                                 self.observer.message(&Message::Warning(text));
@@ -402,9 +390,7 @@ impl<'a> Job<'a> {
             }
         }
         self.warn_of_overshoot(recorder);
-        if let (Some(energy), Some(row)) = (&energy, &recorder.last_row)
-            && let Some(text) = energy.check_end(row, StepKinds::of(self.problem))
-        {
+        if let Some(text) = recorder.check_energy_at_end(self.problem) {
             self.observer.message(&Message::Warning(text));
         }
         Ok(LoopEnd::Complete)
@@ -501,6 +487,7 @@ impl<'a> Job<'a> {
             }
         };
         recorder.observer.continue_from(header.start);
+        recorder.energy.continue_from(header.energy_watch);
         if continued
             .iter()
             .any(|continuation| *continuation != Continuation::Resume)

@@ -7,13 +7,14 @@ use crate::comm::{self, Communicator, IdOrder, agree};
 use crate::error::{Error, ErrorKind, Result};
 use crate::output::checkpoint::{FurtherResult, Header, is_taken};
 use crate::output::{HistoryContents, Number, ResultFile, ResultReader, mix};
-use crate::problem::Output;
+use crate::problem::{Output, Problem};
 use crate::solver::motion::Clock;
 use crate::solver::observers::Schedule;
 use crate::solver::observers::{HistoryObserver, HistoryRow, Snapshot};
 use crate::solver::{Simulation, Stepper};
 
 use super::crack_files;
+use super::energy_watch::{EnergyWatch, StepKinds, check_finite};
 use super::files::Files;
 use super::layout::{FIXED, select};
 use super::observer::{Observer, Row};
@@ -27,6 +28,8 @@ const BUFFERED_ROWS: usize = 256;
 pub struct Recorder<'a> {
     /// Observer that computes the rows of the history.
     pub observer: HistoryObserver,
+    /// Checks of the energy balance.
+    pub energy: EnergyWatch,
     /// Plan of the exchange between owned points and ranges of ids, for checkpoints and results.
     pub order: IdOrder,
     /// The last row of the history; `None` before the first row.
@@ -87,6 +90,7 @@ impl<'a> Recorder<'a> {
         observer.record_past(&past);
         Ok(Self {
             observer,
+            energy: EnergyWatch::new(simulation),
             order,
             last_row: None,
             spent: Duration::ZERO,
@@ -236,10 +240,33 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    /// Return the largest absolute value of an energy (J) in the history rows that were written before a
-    /// restart; 0 if there are no such rows.
-    pub fn largest_past_energy(&self) -> f64 {
-        self.observer.largest_past_energy()
+    /// Check the energies in the history row of the current step, and return warnings. If no row was due,
+    /// nothing is checked. `is_last` says whether the step is the last of the run. The warnings are the same
+    /// on all ranks.
+    ///
+    /// # Errors
+    /// If an energy is not finite, or a time step is clearly unstable.
+    pub fn check_energy<const D: usize>(
+        &mut self,
+        simulation: &Simulation<'_, D>,
+        is_last: bool,
+    ) -> Result<Vec<String>> {
+        let clock = &simulation.clock;
+        let is_now = |row: &&HistoryRow| row.number == clock.number();
+        let Some(row) = self.last_row.as_ref().filter(is_now) else {
+            return Ok(Vec::new());
+        };
+        check_finite(row, clock)?;
+        if !is_closed(simulation.problem) {
+            return Ok(Vec::new());
+        }
+        self.energy.check_row(row, simulation, is_last)
+    }
+
+    /// Return a warning if the energy balance does not close at the end of the run.
+    pub fn check_energy_at_end(&self, problem: &Problem) -> Option<String> {
+        let row = self.last_row.as_ref().filter(|_| is_closed(problem))?;
+        self.energy.check_end(row, StepKinds::of(problem))
     }
 
     /// Return the row of the history at the current step; `None` if no row was due.
@@ -288,6 +315,12 @@ impl<'a> Recorder<'a> {
         }
         Ok(())
     }
+}
+
+/// Whether the energy balance of a run is checked. The energy input from changing temperatures is not
+/// counted, so the balance of runs with changing temperatures is not checked.
+fn is_closed(problem: &Problem) -> bool {
+    !problem.temperature_changes()
 }
 
 /// Clean up after a result file could not be opened. Close all open result files, and delete each of these

@@ -307,19 +307,3 @@ fn angular_momentum_of_a_turning_body_stays() {
         assert_eq!([of("x"), of("y"), of("z")], [0.0, 2.0 * square, -32.0]);
     });
 }
-
-#[test]
-fn the_largest_energy_of_earlier_rows_is_known_after_a_restart() {
-    simulate::<2, _>(PLATES, |mut simulation| {
-        let mut observer = HistoryObserver::new(&simulation).unwrap();
-        let rows = rows_to_the_end(&mut observer, &mut simulation);
-        let kinetic = column(&observer, "kinetic_energy");
-        let largest = rows.iter().map(|row| row[kinetic]).fold(0.0, f64::max);
-        let mut restarted = HistoryObserver::new(&simulation).unwrap();
-        assert_eq!(restarted.largest_past_energy(), 0.0);
-        restarted.record_past(&rows);
-        // At the start, all energy is kinetic energy.
-        assert_eq!(restarted.largest_past_energy(), largest);
-        assert!(largest > 0.0);
-    });
-}

@@ -61,21 +61,7 @@ pub struct HistoryObserver {
     /// bonds that were intact before any bond could break. Each bond counts twice. `None` before the first
     /// row.
     start: Option<(f64, u64)>,
-    /// Largest energy of earlier rows, J; 0 without earlier rows.
-    largest_past_energy: f64,
 }
-
-/// Columns with energies. After a restart, the largest magnitude in these columns of earlier rows is taken as
-/// the largest energy before the restart. The kinetic energies of rigid bodies, one column per body, are left
-/// out.
-const ENERGIES: [&str; 6] = [
-    "kinetic_energy",
-    "strain_energy",
-    "fracture_energy",
-    "contact_energy",
-    "external_work",
-    "dissipated_energy",
-];
 
 /// Energies of all bodies, J.
 #[derive(Debug, Clone, Copy, Default)]
@@ -229,7 +215,6 @@ impl HistoryObserver {
             tips,
             j_integrals: JIntegrals::new(simulation)?,
             start: None,
-            largest_past_energy: 0.0,
         })
     }
 
@@ -264,25 +249,17 @@ impl HistoryObserver {
         self.start = Some(start);
     }
 
-    /// Read the largest energy, and the crack length of each tracked tip, from earlier rows. The next speeds
-    /// of the tips depend on these lengths.
+    /// Read the crack length of each tracked tip from earlier rows. The next speeds of the tips depend on
+    /// these lengths.
     pub fn record_past(&mut self, rows: &[Vec<f64>]) {
         for row in rows {
             let value = |name: &str| self.columns.value(row, name);
-            let energies = ENERGIES.iter().filter_map(|name| value(name));
-            let largest = energies.fold(0.0, |largest: f64, energy| largest.max(energy.abs()));
-            self.largest_past_energy = self.largest_past_energy.max(largest);
             for tip in &mut self.tips {
                 if let (Some(time), Some(length)) = (value("time"), value(&length_of(tip.name()))) {
                     tip.record_past(time, length);
                 }
             }
         }
-    }
-
-    /// Largest energy of earlier rows, J; 0 without earlier rows.
-    pub fn largest_past_energy(&self) -> f64 {
-        self.largest_past_energy
     }
 
     /// Name and present branches of each tracked crack path; the same on all ranks. Collective.
