@@ -181,6 +181,14 @@ impl Draft {
         self.top.iter().any(|(known, _)| known == key)
     }
 
+    /// Test whether a key before all sections has this text as its value.
+    pub fn top_is(&self, key: &str, text: &str) -> bool {
+        let wanted = Value::text(text);
+        self.top
+            .iter()
+            .any(|(known, value)| known == key && *value == wanted)
+    }
+
     /// Add a section.
     pub fn add(&mut self, section: Section) {
         self.sections.push(section);

@@ -46,9 +46,16 @@ fn plain(path: &Path) -> PathBuf {
     plain
 }
 
+/// Read a finite number.
+fn finite(entry: &str) -> Option<f64> {
+    entry.parse().ok().filter(|number: &f64| number.is_finite())
+}
+
 /// Summary of a point file.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct PointFile {
+    /// Path, relative to the working directory or absolute.
+    pub path: PathBuf,
     /// Column names, if the file has a header.
     pub names: Option<Vec<String>>,
     /// Block numbers in the file.
@@ -71,6 +78,7 @@ impl PointFile {
         // Only the block column matters here, so the number of coordinates is arbitrary.
         let columns = Columns::named(&names, 1).ok();
         let mut file = Self {
+            path: path.to_owned(),
             names: heading.as_ref().map(|heading| heading.names.clone()),
             ..Self::default()
         };
@@ -91,6 +99,33 @@ impl PointFile {
             }
         }
         Some(file)
+    }
+
+    /// Read the positions (m) of the points of two blocks. Return `None` if the file cannot be read, or if it
+    /// has no header with coordinates and block numbers.
+    pub fn positions(&self, blocks: [u64; 2]) -> Option<[Vec<[f64; 3]>; 2]> {
+        let columns = Columns::named(self.names.as_ref()?, self.dimension()?).ok()?;
+        let block = columns.block?;
+        let mut positions = [Vec::new(), Vec::new()];
+        let reader = BufReader::new(File::open(&self.path).ok()?);
+        for row in reader.lines() {
+            let row = row.ok()?;
+            let entries = entries(&row).unwrap_or_default();
+            let number = |column: usize| finite(entries.get(column)?);
+            let coordinates = columns.position.iter().map(|column| number(*column));
+            // The header, comments and blank lines have no numbers.
+            let Some(coordinates) = coordinates.collect::<Option<Vec<f64>>>() else {
+                continue;
+            };
+            let mut position = [0.0; 3];
+            position[..coordinates.len()].copy_from_slice(&coordinates);
+            for (known, positions) in blocks.into_iter().zip(&mut positions) {
+                if number(block) == Some(known as f64) {
+                    positions.push(position);
+                }
+            }
+        }
+        Some(positions)
     }
 
     /// Create the message for a deck whose blocks have no points in this file.

@@ -98,6 +98,39 @@ pub(super) const NO_INTEGRATION: &str =
 pub(super) const OTHER_INFLUENCE: &str =
     "influence is one of constant, linear, gaussian and inverse; constant is used";
 
+/// Log note for a contact of PeriLab whose points may start within the contact radius.
+pub(super) const SHORT_CONTACT: &str = "points of these blocks may start closer to each other than the radius, and \
+     begin to touch later than in PeriLab: the contact distance is at most 0.9 of the distance at the start";
+
+/// Log note for a material of PeriLab whose shear stress is twice that of Hooke's law.
+pub(super) const DOUBLED_SHEAR: &str =
+    "PeriLab 2.2.4 doubles the shear stress of this material, unlike the new deck";
+
+/// Log note for a material of PeriLab whose shear stress is half that of Hooke's law.
+pub(super) const HALVED_SHEAR: &str =
+    "PeriLab 2.2.4 halves the shear stress of this material, unlike the new deck";
+
+/// Log note for a material of PeriLab without plane stress or plane strain in a plane problem.
+pub(super) const SPATIAL_CONSTANTS: &str = "without `Symmetry`, PeriLab uses constants of 3-D, so its bond forces differ from those of the new deck";
+
+/// Log note for PeriLab's correction of bond forces near surfaces.
+pub(super) const UNCORRECTED_SURFACE: &str = "bond forces are not multiplied by the factor of this correction, so the \
+     stiffness differs from that in PeriLab";
+
+/// Log note for PeriLab's damping of bonds near damaged points.
+pub(super) const UNDAMPED_DAMAGE: &str =
+    "the motion of damaged points is not damped, so cracks may grow faster or branch";
+
+/// Log notes for keys with other results in the new deck. A warning repeats these notes with their lines.
+const CONSEQUENCES: [&str; 6] = [
+    SHORT_CONTACT,
+    DOUBLED_SHEAR,
+    HALVED_SHEAR,
+    SPATIAL_CONSTANTS,
+    UNCORRECTED_SURFACE,
+    UNDAMPED_DAMAGE,
+];
+
 /// Peridigm's key for omitting bonds between blocks.
 pub(super) const OMITTED_BONDS: &str = "Omit Bonds Between Blocks";
 
@@ -127,6 +160,8 @@ pub struct Losses {
     pub unordered_initials: Vec<usize>,
     /// Lines of damage models whose compressed bonds do not break in the new deck.
     pub intact_compressed: Vec<usize>,
+    /// Notes on keys with other results in the new deck, and the lines of these keys.
+    pub consequences: Vec<(&'static str, usize)>,
 }
 
 impl Losses {
@@ -150,6 +185,12 @@ impl Losses {
                     lines.push(entry.line);
                 }
             }
+            let noted = CONSEQUENCES
+                .into_iter()
+                .filter(|note| entry.note.contains(note));
+            losses
+                .consequences
+                .extend(noted.map(|note| (note, entry.line)));
         }
         let lost = entries
             .iter()
@@ -233,6 +274,8 @@ impl fmt::Display for Losses {
         ] {
             parts.extend(lines.iter().map(|line| format!("{note}: line {line}")));
         }
+        let consequences = self.consequences.iter();
+        parts.extend(consequences.map(|(note, line)| format!("{note}: line {line}")));
         formatter.write_str(&parts.join("; "))
     }
 }

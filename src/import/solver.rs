@@ -26,6 +26,10 @@ const EXPLICIT: [&str; 2] = ["Verlet", "Verlet Matrix Based"];
 /// Solvers with implicit time integration.
 const IMPLICIT: [&str; 2] = ["Implicit", "Newmark"];
 
+/// Log note for solvers of PeriLab with a stiffness matrix.
+const LINEAR: &str =
+    "the forces are linear in the displacements in PeriLab, but not in the new deck";
+
 /// Solution method of a stage.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Method {
@@ -249,6 +253,9 @@ pub fn stage(
         damping: None,
         is_damage_enabled,
     };
+    if is(&[STATIC[3], EXPLICIT[1], IMPLICIT[1]]) {
+        log.approximated(solver, LINEAR);
+    }
     if is(&STATIC) {
         if let Some(times) = times {
             let spans = times.windows(2).map(|span| Stage {

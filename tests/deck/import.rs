@@ -540,8 +540,8 @@ fn numbers_of_perilab_without_a_point_are_dropped() {
     assert_eq!(error.lines().next(), Some(message));
 }
 
-/// PeriLab rejects a plane material without plane stress or plane strain. The import assumes plane stress,
-/// and its log says so.
+/// PeriLab uses constants of 3-D for a plane material without `Symmetry`. The import assumes plane stress, and
+/// a warning says so.
 #[test]
 fn a_plane_material_of_perilab_without_symmetry_is_named() {
     let folder = Folder::strip("symmetry");
@@ -553,6 +553,190 @@ fn a_plane_material_of_perilab_without_symmetry_is_named() {
         note.contains("no `Symmetry`: dimension = \"plane-stress\""),
         "{note}"
     );
+    let consequences = imported.losses().consequences;
+    let [(note, 14)] = consequences[..] else {
+        panic!("{consequences:?}")
+    };
+    assert!(note.contains("constants of 3-D"), "{note}");
+}
+
+/// Contact of PeriLab: one force density 9 κ/(π δ⁵) (R − r) V for each pair of points, with the horizon δ of the
+/// slave block, or 9 κ/(π δ³) or 48 κ/(5 π δ³) with `Symmetry`. The new deck has the same spring constants:
+/// 18 S/(π δ⁵) in 3-D, 9 S/(π δ⁴) in plane stress and 72 S/(5 π δ⁴) in plane strain, with the `stiffness` S and
+/// the smaller horizon δ.
+#[test]
+fn contact_of_perilab_has_its_spring_constant() {
+    let folder = Folder::strip("contact");
+    let write = |header: &str, row: &str| {
+        let gap = |x: f64, block: u32| format!("{x} {row} {block} 0.5\n");
+        let text = format!(
+            "header: x {header} block_id volume\n{}{}{}{}",
+            gap(0.0, 1),
+            gap(1.0, 1),
+            gap(2.0, 2),
+            gap(3.0, 2)
+        );
+        folder.write("strip.txt", &text);
+    };
+    let with_contact = |keys: &str, symmetry: &str, horizon: f64| {
+        let contact = format!(
+            "  Contact:\n    Sides:\n      Type: Penalty Contact\n{keys}      Contact Groups:\n        Both:\n          \
+             Master Block ID: 2\n          Slave Block ID: 1\n          Search Radius: 1\n  Blocks:\n"
+        );
+        let second = format!(
+            "    block_2:\n      Block ID: 2\n      Material Model: Alu\n      Density: 2.7e-9\n      Horizon: {horizon}\n  \
+             Boundary Conditions:\n"
+        );
+        let text = STRIP
+            .replacen("  Blocks:\n", &contact, 1)
+            .replacen("  Boundary Conditions:\n", &second, 1)
+            .replacen("Horizon: 1.2\n", "Horizon: 1.5\n", 1)
+            .replacen("isotropic plane stress", symmetry, 1);
+        let imported = folder.import("contact.yaml", &text).unwrap();
+        folder.problem(&imported);
+        let mut lines = imported.text.lines();
+        let stiffness = lines.find_map(|line| line.strip_prefix("stiffness = "));
+        let stiffness = stiffness.unwrap().parse::<f64>().unwrap();
+        (imported, stiffness)
+    };
+    let given = "      Contact Radius: 0.5\n      Contact Stiffness: 4e3\n";
+    let close = |found: f64, expected: f64| {
+        assert!((found / expected - 1.0).abs() < 1e-12, "{found} {expected}");
+    };
+    write("y", "0");
+    for (symmetry, of_contact, expected) in [
+        ("plane stress", "", 4e3 / 1.5),
+        ("plane stress", "plane stress", 4e3 * 1.5),
+        ("plane strain", "", 0.625 * 4e3 / 1.5),
+        ("plane strain", "plane strain", 4e3 * 1.5 / 1.5),
+    ] {
+        let keys = match of_contact {
+            "" => given.to_owned(),
+            of_contact => format!("{given}      Symmetry: {of_contact}\n"),
+        };
+        let (imported, stiffness) = with_contact(&keys, symmetry, 1.5);
+        close(stiffness, expected);
+        let losses = imported.losses();
+        assert!(losses.consequences.is_empty(), "{losses}");
+    }
+    // PeriLab's default stiffness, and points that start closer than the radius.
+    let (imported, stiffness) = with_contact("      Contact Radius: 1.1\n", "plane stress", 1.5);
+    close(stiffness, 1e8 / 1.5);
+    let warning = imported.losses().to_string();
+    let note = "at most 0.9 of the distance at the start: line ";
+    assert!(warning.contains(note), "{warning}");
+    write("y z", "0 0");
+    let (_, stiffness) = with_contact(given, "3D", 1.5);
+    close(stiffness, 4e3 / 2.0);
+    // The formula of PeriLab contains the horizon of the slave block, that of Fissure the smaller one.
+    let (_, stiffness) = with_contact(given, "3D", 1.2);
+    close(stiffness, 4e3 / 2.0 * (1.2_f64 / 1.5).powi(5));
+}
+
+/// PeriLab takes C:E as the Cauchy stress, and doubles or halves the shear stress for some symmetries.
+#[test]
+fn correspondence_of_perilab_has_its_cauchy_stress() {
+    let folder = Folder::strip("cauchy");
+    let given = "        Young's Modulus: 7.0e+4\n        Poisson's Ratio: 0.34\n";
+    let with_keys = |symmetry: &str, keys: &str| {
+        let text = STRIP
+            .replacen("Bond-based Elastic", "Correspondence Elastic", 1)
+            .replacen("isotropic plane stress", symmetry, 1)
+            .replacen(given, keys, 1);
+        let imported = folder.import("cauchy.yaml", &text).unwrap();
+        folder.problem(&imported);
+        let has_stress = imported.text.contains("\nstress = \"willberg2022\"\n");
+        let consequences = imported.losses().consequences;
+        let notes: Vec<&str> = consequences.iter().map(|(note, _)| *note).collect();
+        (has_stress, notes.join(" "))
+    };
+    let associated = format!("{given}        Bond Associated: true\n");
+    let (has_stress, notes) = with_keys("isotropic plane stress", given);
+    assert!(has_stress && notes.is_empty(), "{notes}");
+    let (has_stress, notes) = with_keys("isotropic plane stress", &associated);
+    assert!(has_stress && notes.contains("halves"), "{notes}");
+    // Bodies that yield need the default stress.
+    let yields = format!("{given}        Yield Stress: 5\n");
+    assert!(!with_keys("isotropic plane stress", &yields).0);
+    folder.write(
+        "strip.txt",
+        "header: x y z block_id volume\n0 0 0 1 0.5\n1 0 0 1 0.5\n",
+    );
+    let (has_stress, notes) = with_keys("isotropic", given);
+    assert!(has_stress && notes.contains("doubles"), "{notes}");
+    let (has_stress, notes) = with_keys("isotropic", &associated);
+    assert!(has_stress && notes.is_empty(), "{notes}");
+}
+
+/// PeriLab's transversely isotropic solid: y and z are equivalent.
+#[test]
+fn transverse_isotropy_of_perilab_is_orthotropic() {
+    let folder = Folder::strip("transverse");
+    let given = "        Young's Modulus: 7.0e+4\n        Poisson's Ratio: 0.34\n";
+    let constants = "        Young's Modulus X: 135\n        Young's Modulus Y: 9\n        Poisson's Ratio XY: 0.27\n        \
+                     Poisson's Ratio YZ: 0.4\n        Shear Modulus XY: 4.5\n        Shear Modulus YZ: 3\n";
+    let with_points = |points: &str, symmetry: &str| {
+        folder.write("strip.txt", points);
+        let text = STRIP
+            .replacen("Bond-based Elastic", "Correspondence Elastic", 1)
+            .replacen("isotropic plane stress", symmetry, 1)
+            .replacen(given, constants, 1);
+        let imported = folder.import("transverse.yaml", &text).unwrap();
+        folder.problem(&imported);
+        imported
+    };
+    let solid = "header: x y z block_id volume\n0 0 0 1 0.5\n1 0 0 1 0.5\n";
+    let plane = "header: x y block_id volume\n0 0 1 0.5\n1 0 1 0.5\n";
+    for (points, symmetry) in [
+        (solid, "transverse isotropic"),
+        (plane, "transverse isotropic plane strain"),
+    ] {
+        let imported = with_points(points, symmetry);
+        for line in [
+            "youngs_modulus_z = 9\n",
+            "poisson_ratio_xz = 0.27\n",
+            "shear_modulus_xz = 4.5\n",
+            "shear_modulus_yz = 3\n",
+        ] {
+            assert!(imported.text.contains(line), "{line}\n{}", imported.text);
+        }
+        // The modulus differs from E_y/(2 (1 + ν_yz)) = 3.2.
+        let key = "PeriLab > Models > Material Models > Alu > Shear Modulus YZ";
+        assert_eq!(fate(&imported, key).0, Fate::Approximated);
+    }
+    let imported = with_points(plane, "transverse isotropic plane stress");
+    assert!(
+        !imported.text.contains("\nshear_modulus_yz"),
+        "{}",
+        imported.text
+    );
+}
+
+/// Corrections and damping of PeriLab that the new deck lacks are named in a warning.
+#[test]
+fn corrections_of_perilab_without_a_counterpart_are_losses() {
+    let folder = Folder::strip("corrections");
+    let text = STRIP
+        .replacen(
+            "  Blocks:\n",
+            "  Surface Correction:\n    Type: Volume Correction\n  Blocks:\n",
+            1,
+        )
+        .replacen(
+            "Critical Value: 12.5\n",
+            "Critical Value: 12.5\n        Local Damping:\n          Damping coefficient: 0.9\n",
+            1,
+        );
+    let imported = folder.import("strip.yaml", &text).unwrap();
+    folder.problem(&imported);
+    let consequences = imported.losses().consequences;
+    let lines: Vec<usize> = consequences.iter().map(|(_, line)| *line).collect();
+    assert_eq!(lines, [23, 29], "{consequences:?}");
+    let linear = STRIP.replacen("    Verlet:\n", "    Linear Static Matrix Based:\n", 1);
+    let imported = folder.import("strip.yaml", &linear).unwrap();
+    let (fate, note) = fate(&imported, "PeriLab > Solver > Linear Static Matrix Based");
+    assert_eq!(fate, Fate::Approximated);
+    assert!(note.contains("linear in the displacements"), "{note}");
 }
 
 #[test]

@@ -9,6 +9,18 @@ use crate::import::draft::Value;
 use crate::import::translation::Translation;
 use crate::import::tree::{Node, is_key};
 
+/// A block of the source deck that became a body.
+pub(super) struct Block {
+    /// Name in the source deck.
+    pub(super) name: String,
+    /// `Block ID`.
+    pub(super) id: u64,
+    /// Name of the body in the new deck.
+    pub(super) body: String,
+    /// Horizon, m.
+    pub(super) horizon: f64,
+}
+
 /// Return the value of the key `points.block` for the body of a block. Return `None` if this body has all
 /// elements of the mesh. `id` is the number of the block. `is_only` says whether the deck has no other block.
 fn block_of_points(
@@ -61,15 +73,14 @@ fn block_of_points(
     Some(Value::text(set))
 }
 
-/// Read the blocks, and write the materials and bodies of the new deck. Return name, number and body of each
-/// block.
+/// Read the blocks, and write the materials and bodies of the new deck.
 pub(super) fn read_blocks(
     translation: &mut Translation,
     node: &Node,
     points: &Points,
     laws: &Laws,
     damping: Option<f64>,
-) -> Result<Vec<(String, u64, String)>> {
+) -> Result<Vec<Block>> {
     let (mut bodies, mut blocks) = (Vec::new(), Vec::new());
     let mut written: Vec<(String, String, String)> = Vec::new();
     for (name, table) in node.tables() {
@@ -196,7 +207,12 @@ pub(super) fn read_blocks(
         };
         let mut source = vec![(points.0.to_owned(), points.1.clone())];
         source.extend(block.map(|block| ("block".to_owned(), block)));
-        blocks.push((name.to_owned(), id, body.clone()));
+        blocks.push(Block {
+            name: name.to_owned(),
+            id,
+            body: body.clone(),
+            horizon,
+        });
         bodies.push(Body {
             name: body,
             material: material_written,

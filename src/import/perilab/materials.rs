@@ -4,7 +4,7 @@ use crate::error::{Result, excerpt};
 use crate::import::bodies::{Criterion, DamageModel};
 use crate::import::draft::{Section, Value};
 use crate::import::elastic::Constants;
-use crate::import::log::Fate;
+use crate::import::log::{DOUBLED_SHEAR, Fate, HALVED_SHEAR, UNDAMPED_DAMAGE};
 use crate::import::translation::Translation;
 use crate::import::tree::{Node, is_key};
 
@@ -38,19 +38,30 @@ const PRECEDENCE: [&str; 4] = [
 /// Log note for an elastic constant that PeriLab ignores.
 const IGNORED: &str = "PeriLab computes it from the other constants";
 
-/// Constants of an orthotropic solid: name, key in the new deck, and whether plane problems use the
-/// constant.
+/// Constants of an orthotropic solid: name, key in the new deck, and whether thin sheets in plane stress have
+/// the constant.
 const ORTHOTROPIC: [(&str, &str, bool); 9] = [
     ("Young's Modulus X", "youngs_modulus_x", true),
     ("Young's Modulus Y", "youngs_modulus_y", true),
-    ("Young's Modulus Z", "youngs_modulus_z", true),
+    ("Young's Modulus Z", "youngs_modulus_z", false),
     ("Poisson's Ratio XY", "poisson_ratio_xy", true),
-    ("Poisson's Ratio YZ", "poisson_ratio_yz", true),
-    ("Poisson's Ratio XZ", "poisson_ratio_xz", true),
+    ("Poisson's Ratio YZ", "poisson_ratio_yz", false),
+    ("Poisson's Ratio XZ", "poisson_ratio_xz", false),
     ("Shear Modulus XY", "shear_modulus_xy", true),
     ("Shear Modulus YZ", "shear_modulus_yz", false),
     ("Shear Modulus XZ", "shear_modulus_xz", false),
 ];
+
+/// Constants of a transversely isotropic solid that equal other constants: key of the constant and key of the
+/// other constant, both in the new deck. The isotropic plane is that of y and z.
+const TRANSVERSE: [(&str, &str); 3] = [
+    ("youngs_modulus_z", "youngs_modulus_y"),
+    ("poisson_ratio_xz", "poisson_ratio_xy"),
+    ("shear_modulus_xz", "shear_modulus_xy"),
+];
+
+/// Relative tolerance for the comparison of elastic constants.
+const ROUND_OFF: f64 = 1e-6;
 
 /// Thermal expansion of a material.
 #[derive(Debug, Clone, PartialEq)]
@@ -183,6 +194,11 @@ pub(super) fn write_material(
     if let Some(damping) = damping {
         section.set("damping", Value::number(damping));
     }
+    let yields = model.law == "ordinary_plastic" || (model.law == "correspondence" && !anisotropic);
+    let yield_stress = table.get("Yield Stress").filter(|_| yields);
+    if is_correspondence {
+        write_stress(translation, model, yield_stress, expansion, &mut section);
+    }
     if anisotropic {
         for (key, angle) in ["angle_1", "angle_2", "angle_3"].into_iter().zip(angles) {
             if angle != 0.0 {
@@ -212,8 +228,7 @@ pub(super) fn write_material(
             .log
             .taken(node, "this law has no modes of zero energy");
     }
-    let yields = model.law == "ordinary_plastic" || (model.law == "correspondence" && !anisotropic);
-    if let (Some(node), true) = (table.get("Yield Stress"), yields) {
+    if let Some(node) = yield_stress {
         translation.log.taken(node, "yield_stress of the material");
         section.set(
             "yield_stress",
@@ -230,6 +245,52 @@ pub(super) fn write_material(
     }
     translation.add(section);
     Ok(())
+}
+
+/// Write the stress of a correspondence law. PeriLab takes C:E as the Cauchy stress, with the Green–Lagrange
+/// strain E. In the new deck, bodies that yield and bodies that expand in plane strain do not have this stress.
+fn write_stress(
+    translation: &Translation,
+    model: &Model,
+    yield_stress: Option<&Node>,
+    expansion: Option<&Expansion>,
+    section: &mut Section,
+) {
+    let is_confined = translation.draft.top_is("dimension", "plane-strain");
+    let Some(node) = model.node.get("Material Model") else {
+        return;
+    };
+    let note = if yield_stress.is_some() {
+        "bodies that yield have St. Venant–Kirchhoff's stress, not C:E as Cauchy stress"
+    } else if expansion.is_some() && is_confined {
+        "bodies that expand in plane strain have St. Venant–Kirchhoff's stress, not C:E as Cauchy stress"
+    } else {
+        section.set("stress", Value::text("willberg2022"));
+        "stress = \"willberg2022\""
+    };
+    translation.log.approximated(node, note);
+    if let Some(note) = shear_note(model, translation.dimension) {
+        translation.log.approximated(node, note);
+    }
+}
+
+/// Return the log note on the shear stress of a correspondence law; `None` if PeriLab's shear stress is that
+/// of Hooke's law.
+///
+/// For some symmetries, Hooke's matrix of PeriLab contains 2G in place of G. PeriLab multiplies the matrix by
+/// engineering shear strains, or, in bond-associated laws, by components of the strain tensor.
+fn shear_note(model: &Model, dimension: usize) -> Option<&'static str> {
+    let symmetry = model.node.get("Symmetry")?.text()?.to_lowercase();
+    let has_doubled_modulus = !symmetry.contains("anisotropic")
+        && (dimension == 3
+            || symmetry.contains("orthotropic")
+            || symmetry.contains("transverse isotropic"));
+    let is_bond_associated = model.law == "bond_associated_correspondence";
+    match (is_bond_associated, has_doubled_modulus) {
+        (false, true) => Some(DOUBLED_SHEAR),
+        (true, false) => Some(HALVED_SHEAR),
+        _ => None,
+    }
 }
 
 /// Write Young's modulus of a bond-based law. Return false if there is no constant to compute it from.
@@ -295,14 +356,20 @@ fn anisotropic(
             }
         }
     }
-    for (name, key, of_plane) in ORTHOTROPIC {
+    let is_sheet = translation.draft.top_is("dimension", "plane-stress");
+    let symmetry = table.get("Symmetry").and_then(Node::text).unwrap_or("");
+    let is_transverse = symmetry.to_lowercase().contains("transverse isotropic");
+    for (name, key, of_sheet) in ORTHOTROPIC {
         let Some(node) = table.get(name) else {
             continue;
         };
         if !is_correspondence {
             translation.log.left_out(node, "this law is isotropic");
-        } else if in_plane && !of_plane {
-            translation.log.left_out(node, "the problem has no z");
+        } else if is_sheet && !of_sheet {
+            let note = "a thin sheet in plane stress has no such constant";
+            translation.log.left_out(node, note);
+        } else if is_transverse && TRANSVERSE.iter().any(|(known, _)| *known == key) {
+            translation.log.left_out(node, IGNORED);
         } else {
             section.set(key, translation.number_value(node, name)?);
             translation
@@ -311,7 +378,38 @@ fn anisotropic(
             found = true;
         }
     }
+    if is_transverse && found && !is_sheet {
+        write_transverse(translation, table, section)?;
+    }
     Ok(found)
+}
+
+/// Write the constants of a transversely isotropic solid that follow from the given constants.
+fn write_transverse(translation: &Translation, table: &Node, section: &mut Section) -> Result<()> {
+    for (key, other) in TRANSVERSE {
+        if let Some(value) = section.get(other).cloned() {
+            section.set(key, value);
+        }
+    }
+    let (young, ratio) = ("Young's Modulus Y", "Poisson's Ratio YZ");
+    let (Some(young_node), Some(ratio_node)) = (table.get(young), table.get(ratio)) else {
+        return Ok(());
+    };
+    let young = translation.number(young_node, young)?;
+    let shear = young / (2.0 * (1.0 + translation.number(ratio_node, ratio)?));
+    let key = "Shear Modulus YZ";
+    match table.get(key) {
+        None => {
+            section.set("shear_modulus_yz", Value::number(shear));
+        }
+        Some(node) if (translation.number(node, key)? / shear - 1.0).abs() > ROUND_OFF => {
+            let note = "PeriLab also computes c22 and c33 from this modulus, the new deck computes them from \
+                        youngs_modulus_y and poisson_ratio_yz";
+            translation.log.approximated(node, note);
+        }
+        Some(_) => {}
+    }
+    Ok(())
 }
 
 /// Read the thermal models with expansion. `is_thermal_enabled` says whether the solver enables thermal
@@ -421,6 +519,9 @@ pub(super) fn damages(
                 node,
                 "whether compressed bonds break; see the critical value",
             );
+        }
+        if let Some(node) = table.get("Local Damping") {
+            translation.log.left_out(node, UNDAMPED_DAMAGE);
         }
         if let Some(node) = table.get("Interblock Damage") {
             translation.log.left_out(

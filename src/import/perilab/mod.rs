@@ -11,7 +11,7 @@ use crate::error::Result;
 use crate::import::bodies::note_unused_damages;
 use crate::import::bond_filters::bond_filters;
 use crate::import::draft::Value;
-use crate::import::log::{OTHER_INFLUENCE, UNSCALED_FAMILIES};
+use crate::import::log::{OTHER_INFLUENCE, UNCORRECTED_SURFACE, UNSCALED_FAMILIES};
 use crate::import::outputs::Outputs;
 use crate::import::sets::Sets;
 use crate::import::solver;
@@ -105,10 +105,10 @@ pub fn translate(translation: &mut Translation, root: &Node) -> Result<()> {
         }
     }
     let has_temperature = conditions(translation, root, &mut sets, &stages, has_expansion)?;
-    contact(translation, root, &bodies)?;
+    contact(translation, root, &bodies, &points, setting)?;
     let names: Vec<(String, String)> = bodies
         .iter()
-        .map(|body| (body.0.clone(), body.2.clone()))
+        .map(|block| (block.name.clone(), block.body.clone()))
         .collect();
     let mut outputs = Outputs::new(has_temperature);
     if let Some(computed) = root.get("Compute Class Parameters") {
@@ -119,9 +119,12 @@ pub fn translate(translation: &mut Translation, root: &Node) -> Result<()> {
     }
     outputs.finish(translation, solver::duration(&stages));
     sets.finish(translation);
-    for name in ["FEM", "Surface Correction"] {
+    for (name, note) in [
+        ("FEM", "has no counterpart"),
+        ("Surface Correction", UNCORRECTED_SURFACE),
+    ] {
         if let Some(node) = root.get(name).or(discretization.get(name)) {
-            translation.log.left_out(node, "has no counterpart");
+            translation.log.left_out(node, note);
         }
     }
     Ok(())

@@ -3,7 +3,7 @@
 use crate::error::{Result, excerpt};
 use crate::import::draft::Value;
 use crate::import::files::PointFile;
-use crate::import::log::UNUSED_COLUMNS;
+use crate::import::log::{SPATIAL_CONSTANTS, UNUSED_COLUMNS};
 use crate::import::translation::Translation;
 use crate::import::tree::{Node, is_key};
 use crate::mesh::{self, BLOCK, Format, Members};
@@ -292,6 +292,11 @@ pub(super) fn setting(
             if translation.dimension == 2 {
                 let note = format!("has no `Symmetry`: dimension = \"{setting}\"");
                 translation.log.approximated(material, note);
+                // PeriLab rejects a correspondence law without `Symmetry`.
+                let model = material.get("Material Model").and_then(Node::text);
+                if !model.is_some_and(|model| model.to_lowercase().contains("correspondence")) {
+                    translation.log.approximated(material, SPATIAL_CONSTANTS);
+                }
             }
             continue;
         };

@@ -47,6 +47,7 @@ use start::check_outside;
 use state::StepDemand;
 
 pub use by_pair::{ContactNow, contact_now};
+pub use pair::short_range_spring;
 pub use rigid::RigidState;
 use search::MOST_GAP;
 pub use start::Coincident;

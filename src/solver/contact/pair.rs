@@ -132,7 +132,7 @@ impl PairRule {
                 let [first, second] = elastic.map(|elastic| elastic.bulk_modulus());
                 let stiffest = SHORT_RANGE_STIFFNESS * first.min(second);
                 let modulus = rule.stiffness.unwrap_or(stiffest);
-                let constant = micromodulus(dimension, modulus, horizon) / horizon;
+                let constant = short_range_spring(dimension, modulus, horizon);
                 let (share, reference) = (SHORT_RANGE, SHORT_RANGE_OF_REFERENCE);
                 (share, reference, Stiffness::OfVolumes(constant))
             }
@@ -334,10 +334,11 @@ fn restitution_of(ratio: f64) -> f64 {
     libm::exp(-ratio / root * turned)
 }
 
-/// Micromodulus c of a bond-based law with this bulk modulus (Pa) and horizon (m), N/m⁶.
-fn micromodulus(dimension: Dimension, modulus: f64, horizon: f64) -> f64 {
+/// Spring constant of short-range forces divided by the volumes of both points, N/m⁷: c/δ with the
+/// micromodulus c of a bond-based law with this bulk modulus (Pa) and this horizon δ (m).
+pub fn short_range_spring(dimension: Dimension, modulus: f64, horizon: f64) -> f64 {
     let youngs_modulus = 3.0 * (1.0 - 2.0 * dimension.bond_based_poisson_ratio()) * modulus;
-    Pmb::new(dimension, youngs_modulus, horizon).micromodulus
+    Pmb::new(dimension, youngs_modulus, horizon).micromodulus / horizon
 }
 
 fn dot<const D: usize>(a: [f64; D], b: [f64; D]) -> f64 {
