@@ -37,7 +37,8 @@
 //! - `clamp(a, low, high)`: the same as `min(max(a, low), high)`;
 //! - `step(a)`: 0 if `a < 0`, 1 if `a >= 0`;
 //! - `ramp(a, start, end)`: 0 up to `start`, then linear to 1 at `end`, and 1 after `end`; if `end` is not
-//!   after `start`, the value jumps from 0 to 1 at `end`;
+//!   after `start`, the value jumps from 0 to 1 at `end`. A constant `end` before a constant `start` is an
+//!   error;
 //! - `if(condition, a, b)`: `a` if the condition is true, `b` if it is 0, and NaN if it is NaN. The argument
 //!   that is not returned has no effect, even if it is infinite or NaN.
 //!
