@@ -133,6 +133,7 @@ impl Unary {
     pub(super) fn apply(self, value: f64) -> f64 {
         match self {
             Self::Negate => -value,
+            Self::Not if value.is_nan() => value,
             Self::Not => truth(value == 0.0),
             Self::IntegerPower(exponent) => value.powi(exponent),
             Self::Sine => libm::sin(value),
@@ -156,7 +157,8 @@ impl Unary {
             Self::Sign if value < 0.0 => -1.0,
             Self::Sign => value,
             Self::Step if value < 0.0 => 0.0,
-            Self::Step => 1.0,
+            Self::Step if value >= 0.0 => 1.0,
+            Self::Step => value,
         }
     }
 }
@@ -178,8 +180,11 @@ impl Binary {
             Self::GreaterOrEqual => truth(left >= right),
             Self::Equal => truth(left == right),
             Self::NotEqual => truth(left != right),
-            Self::And => truth(left != 0.0 && right != 0.0),
-            Self::Or => truth(left != 0.0 || right != 0.0),
+            Self::And if left == 0.0 || right == 0.0 => 0.0,
+            Self::Or if is_true(left) || is_true(right) => 1.0,
+            Self::And | Self::Or if left.is_nan() || right.is_nan() => f64::NAN,
+            Self::And => 1.0,
+            Self::Or => 0.0,
             Self::Minimum => minimum(left, right),
             Self::Maximum => maximum(left, right),
             Self::ArcTangent => libm::atan2(left, right),
@@ -191,14 +196,20 @@ impl Binary {
 impl Ternary {
     pub(super) fn apply(self, first: f64, second: f64, third: f64) -> f64 {
         match self {
-            Self::Choose if first != 0.0 => second,
-            Self::Choose => third,
+            Self::Choose if is_true(first) => second,
+            Self::Choose if first == 0.0 => third,
+            Self::Choose => first,
             Self::Ramp if first >= third => 1.0,
             Self::Ramp if first <= second => 0.0,
             Self::Ramp => (first - second) / (third - second),
             Self::Clamp => minimum(maximum(first, second), third),
         }
     }
+}
+
+/// Test whether a value, taken as a condition, is true: not 0 and not NaN.
+pub(super) fn is_true(value: f64) -> bool {
+    value != 0.0 && !value.is_nan()
 }
 
 fn truth(condition: bool) -> f64 {
@@ -276,7 +287,8 @@ pub(super) fn stack_size(code: &[Instruction]) -> usize {
     largest
 }
 
-/// Return true if the operations in `code` show that the result is always 0 or 1. An example is a comparison.
+/// Return true if the operations in `code` show that the result is always 0, 1 or NaN. An example is a
+/// comparison.
 /// The function does not compute with the values of constants and variables, so it returns false for `0*x`,
 /// for example.
 pub(super) fn is_truth(code: &[Instruction]) -> bool {

@@ -9,7 +9,7 @@
 
 use std::sync::Arc;
 
-use super::evaluate::{Binary, Instruction, Ternary, Unary};
+use super::evaluate::{Binary, Instruction, Ternary, Unary, is_true};
 use super::{Table, Variable};
 
 /// A value and its change over the time interval.
@@ -136,7 +136,7 @@ fn ternary(operation: Ternary, [a, b, c]: [Moving; 3]) -> Moving {
     let end = operation.apply(a.end(), b.end(), c.end());
     let is_between = |x: f64| b.value < x && x < c.value;
     let change = match operation {
-        Ternary::Choose if a.value != 0.0 && a.end() != 0.0 => b.change,
+        Ternary::Choose if is_true(a.value) && is_true(a.end()) => b.change,
         Ternary::Choose if a.value == 0.0 && a.end() == 0.0 => c.change,
         Ternary::Ramp
             if b.change == 0.0 && c.change == 0.0 && is_between(a.value) && is_between(a.end()) =>

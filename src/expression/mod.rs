@@ -2,8 +2,9 @@
 //!
 //! # Language
 //!
-//! Every value is a 64-bit float. A condition is true if its value is not 0. Comparisons give 1 or 0. The
-//! following table lists the operators in the order of their precedence, the highest first:
+//! Every value is a 64-bit float. A condition is true if its value is not 0, and neither true nor false if
+//! its value is NaN. Comparisons give 1 or 0; with NaN, all comparisons except `!=` give 0. The following
+//! table lists the operators in the order of their precedence, the highest first:
 //!
 //! | operators | |
 //! |---|---|
@@ -14,6 +15,9 @@
 //! | `a < b` `<=` `>` `>=` `==` `!=` | not chained: `a < b < c` is an error |
 //! | `a && b` | from the left |
 //! | `a \|\| b` | from the left |
+//!
+//! The value of `!NaN` is NaN. The value of `a && b` is 0 if one of them is 0, and that of `a || b` is 1 if one
+//! of them is true; otherwise, both are NaN if one of them is NaN.
 //!
 //! `and`, `or` and `not` are synonyms of `&&`, `||` and `!`. `not x < 1` reads like `not (x < 1)` but would
 //! mean `(not x) < 1`. Therefore a comparison that starts with `!` or `not` is an error: write `!(x < 1)`
@@ -31,11 +35,12 @@
 //! - `sign(a)`: -1, 0 or 1;
 //! - `min(a, b, …)`, `max(a, b, …)`: NaN if any argument is NaN;
 //! - `clamp(a, low, high)`: the same as `min(max(a, low), high)`;
-//! - `step(a)`: 0 if `a < 0`, otherwise 1;
+//! - `step(a)`: 0 if `a < 0`, 1 if `a >= 0`;
 //! - `ramp(a, start, end)`: 0 up to `start`, then linear to 1 at `end`, and 1 after `end`; if `end` is not
-//!   after `start`, the value jumps from 0 to 1 at `end`;
-//! - `if(condition, a, b)`: `a` if the condition is true, otherwise `b`. The argument that is not returned
-//!   has no effect, even if it is infinite or NaN.
+//!   after `start`, the value jumps from 0 to 1 at `end`. A constant `end` before a constant `start` is an
+//!   error;
+//! - `if(condition, a, b)`: `a` if the condition is true, `b` if it is 0, and NaN if it is NaN. The argument
+//!   that is not returned has no effect, even if it is infinite or NaN.
 //!
 //! # Powers
 //!
@@ -279,12 +284,12 @@ impl Expression {
         increment::increment(&self.code, &self.tables, [x, y, z, time], step)
     }
 
-    /// Test whether the value is not 0.
+    /// Test whether the value is neither 0 nor NaN.
     pub fn is_true(&self, position: [f64; 3], time: f64) -> bool {
-        self.evaluate(position, time) != 0.0
+        evaluate::is_true(self.evaluate(position, time))
     }
 
-    /// Return true if the operations of the expression show that its value is always 0 or 1, as for a
+    /// Return true if the operations of the expression show that its value is always 0, 1 or NaN, as for a
     /// comparison. For other expressions whose value is always 0 or 1, such as `0*x`, return false.
     pub fn is_condition(&self) -> bool {
         evaluate::is_truth(&self.code)

@@ -1,9 +1,10 @@
 //! Parser from the text of an expression to postfix code, by precedence climbing.
 
 use super::ExpressionError;
-use super::evaluate::{Binary, Instruction, Unary, append};
+use super::evaluate::{Binary, Instruction, Ternary, Unary, append};
 use super::names::{Function, PI, Scope};
 use super::token::{Kind, Precedence, Token, tokenize};
+use crate::message::format_number;
 
 /// Largest depth of nested operands, parentheses, calls and signs.
 pub(super) const DEEPEST_NESTING: usize = 200;
@@ -244,6 +245,9 @@ impl Parser<'_> {
                 return Ok(());
             }
             (Function::Ternary(operation), 3) => {
+                if operation == Ternary::Ramp {
+                    self.check_ramp(name.start, close.end)?;
+                }
                 self.append(Instruction::Ternary(operation));
                 return Ok(());
             }
@@ -255,6 +259,22 @@ impl Parser<'_> {
         };
         let message = format!("`{}` takes {expected}, got {count}", self.text_of(name));
         Err(ExpressionError::new(name.start, close.end, message))
+    }
+
+    /// Reject a ramp whose constant end is before its constant start. The code must end with the three
+    /// arguments of the ramp; `start` and `end` are the byte range of the call.
+    fn check_ramp(&self, start: usize, end: usize) -> Result<(), ExpressionError> {
+        match self.code[..] {
+            [.., Instruction::Constant(from), Instruction::Constant(to)] if from > to => {
+                let message = format!(
+                    "`ramp(a, start, end)` needs an `end` that is not below `start`; `start` is {}, `end` is {}",
+                    format_number(from),
+                    format_number(to)
+                );
+                Err(ExpressionError::new(start, end, message))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Return the error for a missing value: the next token cannot start a value.

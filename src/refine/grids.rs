@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use crate::comm::{Communicator, agree, all_gather_many};
+use crate::comm::{Communicator, Found, agree, all_gather_many, least};
 use crate::error::{Error, Result};
 use crate::families::cutoff;
 use crate::points::{LatticeBody, Point, crack};
@@ -80,7 +80,8 @@ impl<'a> Grids<'a> {
     /// pre-crack separates two of its parents. `coarse` are this rank's level-0 points. Collective.
     ///
     /// # Errors
-    /// If a region contains no point of a body given as a shape; the error is the same on all ranks.
+    /// If a region contains no point of a body given as a shape, or its condition is NaN at a node. The error
+    /// is the same on all ranks.
     pub fn refine_regions(&mut self, comm: &dyn Communicator, coarse: &[Point]) -> Result<()> {
         let problem = self.problem;
         let Some(refinement) = &problem.refinement else {
@@ -90,16 +91,35 @@ impl<'a> Grids<'a> {
         for region in &refinement.regions {
             for level in 0..region.level {
                 let mut keys: Vec<NodeKey> = Vec::new();
+                let mut undefined: Option<Found<[f64; 3]>> = None;
                 for point in coarse {
                     let Some(grid) = &self.bodies[point.block as usize] else {
                         continue;
                     };
                     grid.for_each_node(point.position, level, &mut |index, position| {
-                        if region.condition.is_true(position, 0.0) {
+                        let value = region.condition.evaluate(position, 0.0);
+                        if value.is_nan() {
+                            let found = Found {
+                                key: 0.0,
+                                ids: [point.id],
+                                payload: position,
+                            };
+                            if undefined.is_none_or(|first| found.ids < first.ids) {
+                                undefined = Some(found);
+                            }
+                        } else if value != 0.0 {
                             let [x, y, z] = index;
                             keys.push([i64::from(point.block), i64::from(level), x, y, z]);
                         }
                     });
+                }
+                if let Some(found) = least(comm, undefined) {
+                    let message = format!(
+                        "[refinement.region.{}] where: is NaN at {:?} m",
+                        region.name,
+                        &found.payload[..problem.dimension.count()]
+                    );
+                    return Err(Error::input(message).at(&region.span));
                 }
                 let all = all_gather_many(comm, &keys);
                 if all.is_empty() {

@@ -13,7 +13,10 @@ use crate::{families, points};
 
 use super::assign::{assign, block_laws, cutoffs, laws_are_possible};
 use super::bonds::{Acting, BondUpdate, ForceTimes, Forces, history_fits};
-use super::conditions::{Conditions, PartConditions, Work, apply_initials, are_finite, members};
+use super::conditions::{
+    Conditions, PartConditions, Work, apply_initials, are_finite, members, sets_are_finite,
+    trigger_is_finite,
+};
 use super::contact::{Contact, ContactEvaluation, StepEnd};
 use super::grids::grids;
 use super::model::Model;
@@ -188,6 +191,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         simulation.begin();
         simulation.check_loads_are_held()?;
         simulation.can_bond_new_points()?;
+        trigger_is_finite(problem, comm, &simulation.model, 0.0)?;
         simulation.times.set_up = start.elapsed();
         Ok(simulation)
     }
@@ -218,6 +222,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
         let (bonds, grids) = agree(comm, found)?;
         between()?;
         let model = Model::new(problem, &domain, refined.coarsest());
+        sets_are_finite(problem, comm, &model)?;
         let blocks = problem.blocks();
         let blocks: Vec<_> = blocks.map(|block| block_laws(problem, &block)).collect();
         let is_thermal = problem.has_temperature();

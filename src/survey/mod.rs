@@ -29,7 +29,7 @@ use crate::solver::Simulation;
 use crate::solver::assign::{block_laws, pair_damage_laws};
 use crate::solver::conditions::members;
 use crate::solver::contact::Coincident;
-use crate::solver::observers::{Nearest, nearest};
+use crate::solver::observers::{Nearest, Snapshot, foreign_tip, nearest};
 
 /// Number of intact bonds of a point in 1-D, 2-D and 3-D below which a warning is printed. The numbers are
 /// half the number of neighbours of a complete family with a horizon of two spacings.
@@ -97,6 +97,7 @@ impl Survey {
         points_on_cracks(simulation, &mut warnings);
         let sets = sets(simulation, &mut warnings);
         let probes = probes(simulation, &mut warnings);
+        foreign_tips(simulation, &mut warnings);
         loads::check_conditions(simulation, &mut warnings);
         few_neighbours(simulation, &mut warnings);
         coincident(simulation, &mut warnings);
@@ -358,6 +359,26 @@ fn probes<const D: usize>(
         found
     };
     problem.history.probes.iter().map(follow).collect()
+}
+
+/// Warn of tips that lie on another crack than the one at their `from`.
+fn foreign_tips<const D: usize>(simulation: &mut Simulation<'_, D>, warnings: &mut Vec<Warning>) {
+    let problem = simulation.problem;
+    if problem.history.tips.is_empty() || problem.cracks.len() < 2 {
+        return;
+    }
+    let snapshot = Snapshot::without_energies(simulation);
+    for tip in &problem.history.tips {
+        if let Some(position) = foreign_tip(simulation, tip, &snapshot) {
+            let message = format!(
+                "[history.tip.{}]: the farthest damage along `direction`, at {:?} m, lies on another crack than the \
+                 damage at `from`; give a `set` that contains the points of one crack only",
+                tip.name,
+                &position[..D]
+            );
+            warnings.push(Warning::new(message).at(&tip.span));
+        }
+    }
 }
 
 /// Warn of points of different bodies at the same position. Contact cannot act between such points.

@@ -112,6 +112,38 @@ fn figures_of_bodies_cracks_and_probes() {
 }
 
 #[test]
+fn a_tip_on_another_crack_than_the_one_at_its_start_is_told() {
+    let cracks = "set.low.where = 'y < 4'
+        history.reactions = ['low']
+        crack.left.segment = { from = [-1, 2], to = [4, 2] }
+        crack.right.segment = { from = [13, 6], to = [8, 6] }
+        ";
+    let told = |tip: &str, expected: &[&str]| {
+        warns(
+            &format!("{cracks}history.tip.notch = {{ {tip} }}"),
+            expected,
+        );
+    };
+    told(
+        "from = [0, 2], direction = [1, 0]",
+        &[
+            "[history.tip.notch]: the farthest damage along `direction`, at [11.5, 5.5] m, lies on another crack than \
+             the damage at `from`; give a `set` that contains the points of one crack only",
+        ],
+    );
+    told(
+        "from = [12, 6], direction = [-1, 0]",
+        &[
+            "[history.tip.notch]: the farthest damage along `direction`, at [0.5, 1.5] m, lies on another crack than \
+             the damage at `from`; give a `set` that contains the points of one crack only",
+        ],
+    );
+    told("from = [0, 2], direction = [1, 0], set = 'low'", &[]);
+    // No crack begins at `from`.
+    told("from = [0, 7.5], direction = [1, 0]", &[]);
+}
+
+#[test]
 fn motions_of_which_one_takes_the_place_of_the_other() {
     let sets = "set.left.where = 'x < 1'\nset.low.where = 'y < 1'\n";
     let both = |first: &str, second: &str| {

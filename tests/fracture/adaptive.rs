@@ -83,6 +83,35 @@ fn steps_that_are_long_for_bonds_that_break_are_told() {
     assert!(!warned("safety = 0.8", &["--quiet"]));
 }
 
+/// All bonds of a bar reach their criterion at the same time. With one load step, they break at 1.34 times their
+/// critical stretch.
+#[test]
+fn load_steps_that_are_long_for_bonds_that_break_are_told() {
+    let folder = Folder::new("overshoot_of_load_steps");
+    let warned = |load_steps: u32| {
+        let text_of_deck = format!(
+            "dimension = '1d'
+            grid = {{ spacing = 1, horizon = 3 }}
+            material.rubber.pmb = {{ density = 2, youngs_modulus = 5 }}
+            damage.brittle.critical_stretch = {{ critical_stretch = 0.0149, alpha = 0 }}
+            body.bar = {{ material = 'rubber', damage = 'brittle', shape.box = {{ lower = [0], upper = [20] }} }}
+            condition.pull = {{ set = 'all', displacement = ['0.02*t*x'] }}
+            time = {{ end = 1, method = 'relaxation', relaxation.load_steps = {load_steps} }}"
+        );
+        let deck = folder.write("deck.toml", &text_of_deck);
+        let mut command = fissure(1);
+        command.arg("run").arg(deck).arg("--overwrite");
+        let output = finish(command.arg("--output").arg(folder.join("out")));
+        assert!(output.status.success(), "{}", text(&output));
+        let told = text(&output);
+        let found = told.contains("bonds broke up to one load step late");
+        assert_eq!(found, told.contains("twice the `load_steps` and compare"));
+        found
+    };
+    assert!(warned(1));
+    assert!(!warned(4));
+}
+
 /// The energy balance closes in each row, also if the motion of a support jumps between two steps.
 #[test]
 fn a_kink_of_a_support_does_not_spoil_the_energy_balance() {

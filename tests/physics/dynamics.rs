@@ -541,6 +541,56 @@ fn a_reaction_knows_a_motion_better_than_its_rounded_places() {
     }
 }
 
+/// In the first row, the values of a support before the start must not count.
+#[test]
+fn a_support_has_its_reaction_from_the_first_row() {
+    for (motion, speed, acceleration) in [
+        ("velocity = ['0.2 + 3*t']", 0.2, 3.0),
+        ("displacement = ['0.2*t + 1.5*t^2']", 0.2, 3.0),
+        // Jumps at the start have no part in the reaction.
+        ("velocity = [5]", 5.0, 0.0),
+        ("displacement = ['0.3 + 2*t']", 2.0, 0.0),
+        // The value after two steps is NaN.
+        ("displacement = ['2*t + 0*sqrt(0.15 - t)']", 2.0, 0.0),
+    ] {
+        let deck = format!(
+            "dimension = '1d'
+            grid = {{ spacing = 1, horizon = 3 }}
+            material.rubber.pmb = {{ density = 2, youngs_modulus = 5 }}
+            body.bar = {{ material = 'rubber', shape.box = {{ lower = [0], upper = [40] }} }}
+            condition.carry = {{ set = 'bar', {motion} }}
+            history.reactions = ['bar']
+            time = {{ end = 1, step = 0.1 }}
+            "
+        );
+        simulate::<1, _>(&deck, |mut simulation| {
+            let mass = 2.0 * simulation.model.volume.iter().sum::<f64>();
+            let mut history = HistoryObserver::new(&simulation).unwrap();
+            let [reaction, momentum] =
+                ["reaction_bar_x", "momentum_x"].map(|name| column(&history, name));
+            loop {
+                let time = simulation.clock.time();
+                let row = row(&mut history, &mut simulation).values;
+                let found = [row[reaction], row[momentum]].map(|sum| sum / mass);
+                for (found, expected) in found
+                    .into_iter()
+                    .zip([acceleration, speed + acceleration * time])
+                {
+                    let error = (found - expected).abs();
+                    assert!(
+                        error < 1e-9,
+                        "{motion} at {time} s: {found}, not {expected}"
+                    );
+                }
+                if motion.contains("sqrt") || simulation.clock.is_over() {
+                    break;
+                }
+                simulation.advance();
+            }
+        });
+    }
+}
+
 #[test]
 fn two_points_that_are_thrown_apart_lose_the_energy_of_their_bond() {
     const CRITICAL: f64 = 0.02;

@@ -1,4 +1,5 @@
-//! Check that loads, supports, temperatures and initial values are finite at all of their points.
+//! Check that loads, supports, temperatures, initial values and conditions of selection are finite at all of
+//! their points.
 
 use std::ops::Range;
 
@@ -6,7 +7,7 @@ use crate::comm::{Communicator, Found, least};
 use crate::error::{Error, Result};
 use crate::expression::Expression;
 use crate::message::format_number;
-use crate::problem::{Action, Problem};
+use crate::problem::{Action, Problem, Selector};
 use crate::solver::model::Model;
 
 use super::members;
@@ -43,7 +44,7 @@ pub fn are_finite<const D: usize>(
                 if let Some((values, place)) = values {
                     let key = format!("[initial.{}] {quantity}", initial.name);
                     let values = values.iter().map(Some).zip([1.0; D]);
-                    check.check_values(&key, &COMPONENTS, place, initial.set, values)?;
+                    check.check_values(&key, &COMPONENTS, place, Some(initial.set), values)?;
                 }
             }
         }
@@ -56,7 +57,7 @@ pub fn are_finite<const D: usize>(
         match &condition.action {
             Action::Displacement(values) | Action::Velocity(values) => {
                 let values = values.iter().map(Option::as_ref).zip([1.0; D]);
-                check.check_values(&key, &COMPONENTS, place, set, values)?;
+                check.check_values(&key, &COMPONENTS, place, Some(set), values)?;
             }
             Action::BodyForce(values, factors) => {
                 // Only the smallest divisor is checked, because this divisor gives the largest load.
@@ -65,18 +66,73 @@ pub fn are_finite<const D: usize>(
                 let smallest_divisor = divisors.into_iter().fold(f64::INFINITY, f64::min);
                 let factors = factors.iter().map(|factor| factor / smallest_divisor);
                 let values = values.iter().map(Some).zip(factors);
-                check.check_values(&key, &COMPONENTS, place, set, values)?;
+                check.check_values(&key, &COMPONENTS, place, Some(set), values)?;
             }
             Action::Force(values) => {
                 let values = values.iter().map(Some).zip([1.0; D]);
-                check.check_values(&key, &COMPONENTS, place, set, values)?;
+                check.check_values(&key, &COMPONENTS, place, Some(set), values)?;
             }
             Action::Temperature(value) => {
                 let values = std::iter::once((Some(value), 1.0));
-                check.check_values(&key, &["is"], place, set, values)?;
+                check.check_values(&key, &["is"], place, Some(set), values)?;
                 check.check_stretches(&key, place, set, value)?;
             }
         }
+    }
+    Ok(())
+}
+
+/// Check that the conditions `where` of all sets are finite at all points. Collective.
+///
+/// # Errors
+/// If a value is not finite. The message names the first set of the deck with such a value, and of the points
+/// at which its value is not finite, the point with the smallest id. The error is the same on all ranks.
+pub fn sets_are_finite<const D: usize>(
+    problem: &Problem,
+    comm: &dyn Communicator,
+    model: &Model<D>,
+) -> Result<()> {
+    let check = FiniteCheck {
+        problem,
+        comm,
+        model,
+        time: 0.0,
+    };
+    for set in &problem.sets {
+        if let Selector::Where(condition) = &set.selector {
+            let key = format!("[set.{}] where", set.name);
+            let value = std::iter::once((Some(condition), 1.0));
+            check.check_values(&key, &["is"], &set.span, None, value)?;
+        }
+    }
+    Ok(())
+}
+
+/// Check that the conditions `where` and `only` of the refinement trigger are finite at all points at `time`
+/// (s). Collective.
+///
+/// # Errors
+/// If a value is not finite. The message names the key, and of the points at which its value is not finite,
+/// the point with the smallest id. The error is the same on all ranks.
+pub fn trigger_is_finite<const D: usize>(
+    problem: &Problem,
+    comm: &dyn Communicator,
+    model: &Model<D>,
+    time: f64,
+) -> Result<()> {
+    let Some(trigger) = problem.refinement_trigger() else {
+        return Ok(());
+    };
+    let check = FiniteCheck {
+        problem,
+        comm,
+        model,
+        time,
+    };
+    for (name, condition) in [("where", &trigger.condition), ("only", &trigger.only)] {
+        let key = format!("[refinement.trigger] {name}");
+        let value = condition.iter().map(|condition| (Some(condition), 1.0));
+        check.check_values(&key, &["is"], &trigger.span, None, value)?;
     }
     Ok(())
 }
@@ -129,8 +185,8 @@ impl<const D: usize> FiniteCheck<'_, D> {
         Err(Error::input(message).at(place))
     }
 
-    /// Return an error if a component is not finite at a point of a set. `components` contains an expression
-    /// and a factor for each component. The component is the product of both. `names` has one entry per
+    /// Return an error if a component is not finite at a point of a set; for `None`, at any point. `components`
+    /// contains an expression and a factor for each component. The component is the product of both. `names` has one entry per
     /// component, such as "component x is". In the error message, the entry of the component precedes its
     /// value. Collective.
     fn check_values<'e>(
@@ -138,7 +194,7 @@ impl<const D: usize> FiniteCheck<'_, D> {
         key: &str,
         names: &[&str],
         place: &Range<usize>,
-        set: usize,
+        set: Option<usize>,
         components: impl Iterator<Item = (Option<&'e Expression>, f64)>,
     ) -> Result<()> {
         let changing: Vec<(usize, &Expression, f64)> = components
@@ -159,7 +215,11 @@ impl<const D: usize> FiniteCheck<'_, D> {
                 (!value.is_finite()).then_some((*component, value))
             })
         };
-        let found = members(self.problem, self.model, set)
+        let points = match set {
+            Some(set) => members(self.problem, self.model, set),
+            None => (0..self.model.owned() as u32).collect(),
+        };
+        let found = points
             .into_iter()
             .filter_map(|point| Some((self.model.ids[point as usize], point, wrong(point)?)))
             .min_by_key(|(id, ..)| *id);

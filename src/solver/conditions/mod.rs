@@ -19,7 +19,7 @@ use crate::refine::{Grids, SetFractions};
 use super::model::Model;
 use super::motion::Fields;
 use super::motion::walk::{PART, Part, parts};
-pub use finite::are_finite;
+pub use finite::{are_finite, sets_are_finite, trigger_is_finite};
 pub use initial::apply_initials;
 pub use load_factors::LoadFactors;
 use loads::{Load, Loaded};

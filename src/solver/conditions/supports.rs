@@ -103,9 +103,9 @@ impl Support {
     /// Velocity (m/s) and acceleration (m/s²) of a point in the Verlet scheme. `position` is the reference
     /// position of the point (m). The step begins at `time` (s) and has the length `step` (s).
     fn moving(&self, position: [f64; 3], time: f64, step: f64) -> (f64, f64) {
-        // For times before the support begins, a displacement is extrapolated linearly, and a velocity is
-        // constant. If the change in the next step is not finite, as for √(1 − t) at t = 1, the change of the
-        // last step is repeated.
+        // Values before the support begins have no meaning. A displacement is extrapolated to such times by a
+        // parabola, and a velocity linearly. If the change in the next step is not finite, as for √(1 − t) at
+        // t = 1, the change of the last step is repeated.
         let has_past = time - self.begin >= 0.5 * step;
         let change = |step: f64| self.values.expression.increment(position, time, step);
         let to_come = match change(step) {
@@ -114,8 +114,11 @@ impl Support {
         };
         let before = match self.motion {
             _ if has_past => -change(-step),
-            Motion::Displacement => to_come,
-            Motion::Velocity => 0.0,
+            Motion::Displacement => match change(2.0 * step) - 2.0 * to_come {
+                second_difference if second_difference.is_finite() => to_come - second_difference,
+                _ => to_come,
+            },
+            Motion::Velocity => to_come,
         };
         match self.motion {
             Motion::Displacement => (

@@ -13,7 +13,7 @@ use super::crack_points::{horizon_of, link, points_of, spacings};
 
 /// Lower limit of the connection distance, in spacings. Two damaged points are connected if they are at most
 /// the connection distance apart. With this limit, diagonal neighbours are connected for any horizon.
-const DIAGONAL: f64 = 1.5;
+pub(super) const DIAGONAL: f64 = 1.5;
 
 /// A crack whose path is tracked.
 pub struct CrackPath {

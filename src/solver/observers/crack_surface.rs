@@ -32,7 +32,7 @@ type Vector = Vector3<f64>;
 
 /// Lower limit of the connection distance, in spacings. Two damaged points are connected if they are at most
 /// the connection distance apart. With this limit, diagonal neighbours are connected for any horizon.
-const DIAGONAL: f64 = 1.8;
+pub(super) const DIAGONAL: f64 = 1.8;
 
 /// Relative tolerance of distance limits: a point at the limit counts as within it.
 const TOLERANCE: f64 = 1e-9;

@@ -8,6 +8,7 @@ mod crack_path;
 mod crack_points;
 mod crack_surface;
 mod cracked;
+mod foreign_tip;
 mod fragments;
 mod front;
 pub mod history;
@@ -24,6 +25,7 @@ mod tip;
 
 pub use centre_line::{Branch, Vertex};
 pub use crack_surface::Surface;
+pub use foreign_tip::foreign_tip;
 pub use history::{Energies, HistoryObserver, HistoryRow, column_names, state_energies};
 pub use interpenetration::{Interpenetration, InterpenetrationWatch};
 pub use nearest::{Nearest, nearest};

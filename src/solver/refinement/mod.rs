@@ -12,7 +12,7 @@ use std::cell::OnceCell;
 
 use crate::comm::sum::reduce;
 use crate::comm::{self, IdOrder};
-use crate::error::{Error, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::points::{Point, distance_squared};
 use crate::problem::StepRule;
 use crate::refine::{Grids, NodeKey};
@@ -23,6 +23,7 @@ mod trigger;
 
 use super::Simulation;
 use super::assign::cutoffs;
+use super::conditions::trigger_is_finite;
 use super::motion::fields::{Birth, plastic_columns};
 use super::observers::Snapshot;
 use super::observers::history::point_sums;
@@ -109,14 +110,21 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// Collective.
     ///
     /// # Errors
-    /// If the points cannot be distributed or bonded: for example, if METIS fails or if a rank has too little
-    /// memory for its bonds. The error is the same on all ranks. The run cannot continue after the error,
-    /// because its points have been freed from memory.
+    /// If the conditions of the trigger are not finite at a point. If the points cannot be distributed or
+    /// bonded: for example, if METIS fails or if a rank has too little memory for its bonds. The error is the
+    /// same on all ranks. The run cannot continue after the error, because its points have been freed from
+    /// memory.
     pub fn refine(&mut self) -> Result<Option<Regridded>> {
         let Some(trigger) = self.trigger() else {
             return Ok(None);
         };
         let start = self.times.start();
+        let time = self.clock.time();
+        let is_finite = trigger_is_finite(self.problem, self.comm, &self.model, time);
+        is_finite.map_err(|error| Error {
+            kind: ErrorKind::Run,
+            ..error
+        })?;
         let snapshot = if trigger.energy.is_some() {
             Snapshot::new(self)
         } else {
