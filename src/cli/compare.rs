@@ -17,8 +17,9 @@ use super::{Verbosity, outln, print, result_file, without_output};
 ///
 /// Matches outputs and history rows by time, and points by id. For each field and history column, prints the
 /// largest difference with its point and time. Also prints the ratio of this difference to the largest
-/// absolute value in A. For momentum, whose terms can cancel, the ratio is to the kinetic energy divided by
-/// the largest velocity if this is larger. Does not compare attributes, which describe the run.
+/// absolute value in A. The terms of a total momentum can cancel, so the ratio for momentum is to √(2 M E) if
+/// this is larger, with the mass M and the largest kinetic energy E of A. Does not compare attributes, which
+/// describe the run.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

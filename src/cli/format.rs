@@ -20,8 +20,8 @@ pub fn with_unit(value: f64, unit: &str) -> String {
     text.trim_end().to_owned()
 }
 
-/// Format a value with four digits, an SI prefix and its unit, such as `50.00 µs`. The unit must take a
-/// prefix; [`with_unit`] formats values with any unit.
+/// Format a value with four digits, an SI prefix and its unit, such as `50.00 µs`. The prefix is written
+/// before any unit, also before `/s`. [`with_unit`] writes a prefix only if the unit takes one.
 pub fn si(value: f64, unit: &str) -> String {
     const PREFIXES: [(f64, &str); 9] = [
         (1e12, "T"),

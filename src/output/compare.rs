@@ -29,8 +29,11 @@ const ID: &str = "id";
 /// Name of the column by which rows are matched.
 const TIME: &str = "time";
 
-/// Beginnings of the names of the columns with components of momentum.
-const MOMENTUM: [&str; 2] = ["momentum_", "largest_fragment_momentum_"];
+/// Name of the column of the kinetic energy.
+const KINETIC_ENERGY: &str = "kinetic_energy";
+
+/// Beginning of the names of the columns with components of momentum.
+const MOMENTUM: &str = "momentum_";
 
 /// Beginning of the names of the columns with components of angular momentum.
 const ANGULAR_MOMENTUM: &str = "angular_momentum_";
@@ -198,7 +201,10 @@ pub fn compare(
     }
     let histories = [first.history()?, second.history()?];
     compare_histories([&histories[0], &histories[1]], &mut comparison);
-    if let Some(momentum) = momentum_scale(&comparison.fields, &times[0], &histories[0]) {
+    let attributes = first.attributes()?;
+    let mass = attributes.iter().find(|(name, _)| name == "mass");
+    let mass = mass.and_then(|(_, mass)| mass.parse().ok());
+    if let Some(momentum) = momentum_scale(mass, &histories[0]) {
         raise_momentum_scales(momentum, &mut comparison);
     }
     Ok(comparison)
@@ -541,35 +547,30 @@ fn compare_histories(histories: [&[StoredColumn]; 2], comparison: &mut Compariso
     }
 }
 
-/// Return E/v, a momentum without cancellation, kg m/s. E is the largest kinetic energy of the first result
-/// at the times of its outputs, and v the largest velocity component in these outputs. With the mass m of a
-/// point, E/v is at most Σ m |u̇|. Return `None` if the first result lacks E or v, or if v is 0.
-fn momentum_scale(fields: &[Difference], outputs: &[f64], history: &[StoredColumn]) -> Option<f64> {
-    let column = |name: &str| history.iter().find(|column| column.name == name);
-    let (times, energies) = (column(TIME)?, column("kinetic_energy")?);
-    let rows = Matches::of(outputs, &times.values).pairs;
-    let energies = rows.iter().map(|[_, row]| energies.values[*row]);
+/// Return √(2 M E), a momentum without cancellation, kg m/s. M is the mass of the points of the first result,
+/// and E the largest kinetic energy in its history. Σ m |u̇| is at most this value. Return `None` if the
+/// first result lacks M or E.
+fn momentum_scale(mass: Option<f64>, history: &[StoredColumn]) -> Option<f64> {
+    let energies = history.iter().find(|column| column.name == KINETIC_ENERGY);
+    let energies = energies?.values.iter().copied();
     let energy = energies
         .filter(|energy| energy.is_finite())
         .reduce(f64::max)?;
-    let velocity = fields.iter().find(|field| field.name == "velocity")?.scale;
-    let momentum = energy / velocity;
-    momentum.is_finite().then_some(momentum)
+    Some((2.0 * mass? * energy).sqrt())
 }
 
-/// Raise the scales of momentum columns to at least `momentum`, kg m/s. In a balanced problem, the terms of
-/// the momentum cancel, and its largest value is round-off. For angular momentum, the scale is at least
-/// `momentum` times the largest coordinate.
+/// Raise the scales of the columns of momentum to at least `momentum`, kg m/s. In a balanced problem, the
+/// terms of the momentum cancel, and its largest value is round-off. For angular momentum, the scale is at
+/// least `momentum` times the largest coordinate.
 fn raise_momentum_scales(momentum: f64, comparison: &mut Comparison) {
     let positions = comparison.fields.iter();
     let length = positions
         .filter(|field| field.name == POSITION)
         .fold(0.0, |_, field| field.scale);
     for column in &mut comparison.columns {
-        let begins = |beginning: &str| column.name.starts_with(beginning);
-        if MOMENTUM.into_iter().any(begins) {
+        if column.name.starts_with(MOMENTUM) {
             column.scale = column.scale.max(momentum);
-        } else if begins(ANGULAR_MOMENTUM) {
+        } else if column.name.starts_with(ANGULAR_MOMENTUM) {
             column.scale = column.scale.max(momentum * length);
         }
     }
@@ -591,21 +592,15 @@ mod tests {
             unit: String::new(),
             values: values.to_vec(),
         };
-        let fields = vec![
-            difference(POSITION, 2.0, 2.0),
-            difference("velocity", -10.0, -10.0),
-        ];
-        // The second row is between two outputs.
         let history = [
             column(TIME, &[0.0, 0.5, 1.0]),
-            column("kinetic_energy", &[0.0, 900.0, 30.0]),
+            column(KINETIC_ENERGY, &[0.0, 2.25, 1.0]),
         ];
-        let momentum = momentum_scale(&fields, &[0.0, 1.0], &history);
-        assert_eq!(momentum, Some(3.0));
-        assert_eq!(momentum_scale(&fields[..1], &[0.0, 1.0], &history), None);
-        assert_eq!(momentum_scale(&fields, &[0.0, 1.0], &history[..1]), None);
+        assert_eq!(momentum_scale(Some(2.0), &history), Some(3.0));
+        assert_eq!(momentum_scale(None, &history), None);
+        assert_eq!(momentum_scale(Some(2.0), &history[..1]), None);
         let mut comparison = Comparison {
-            fields,
+            fields: vec![difference(POSITION, 2.0, 2.0)],
             columns: vec![
                 difference("momentum_x", 1e-19, 2e-19),
                 difference("angular_momentum_z", -1e-19, 1e-19),

@@ -113,8 +113,15 @@ impl Problem {
             return Err(Error::input(message).at(&trigger.span));
         }
         if self.has_newton() {
-            let message = "method: \"static\" is not available with contact; use \"relaxation\" or \"explicit\", or remove \
-                           [contact] and [rigid]";
+            let section = if self.stages.is_empty() {
+                "[time]"
+            } else {
+                "[time] or [[stage]]"
+            };
+            let message = format!(
+                "{section} method: \"static\" is not available with contact; use \"relaxation\" or \"explicit\", or remove \
+                 [contact] and [rigid]"
+            );
             return Err(Error::input(message).at(&self.spans.newton));
         }
         if self.has_relaxation() {

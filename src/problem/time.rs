@@ -98,7 +98,7 @@ impl Method {
     pub fn remedy(&self) -> &'static str {
         match self {
             Self::Static(_) => {
-                "give [time.static] more `load_steps`, `max_iterations` or `max_halvings` or a larger `tolerance`, or use \
+                "give [time.static] more `load_steps`, `max_iterations` or `max_halvings`, or a larger `tolerance`; or use \
                  `method = \"relaxation\"`"
             }
             Self::Explicit | Self::Relaxation(_) => {

@@ -46,6 +46,7 @@ pub use watch::Reason;
 use std::path::PathBuf;
 
 use crate::comm::mpi::{self, World};
+use crate::comm::sum::{ExactSum, reduce};
 use crate::comm::{self, Communicator, agree};
 use crate::deck::{Deck, Source};
 use crate::error::{Error, Result};
@@ -358,7 +359,7 @@ impl<'a> Job<'a> {
                     }
                     slow = slow && !self.warn_of_inertia(stepper, recorder);
                 }
-                if recorder.row_of(&clock).is_some() {
+                if due {
                     let simulation = stepper.at_full_step();
                     match recorder.check_energy(simulation, complete) {
                         Ok(texts) => {
@@ -587,6 +588,12 @@ impl<'a> Job<'a> {
             ],
             None => Default::default(),
         };
+        let model = &simulation.model;
+        let mut mass = [ExactSum::ZERO];
+        for point in 0..model.owned() {
+            mass[0].add(model.density_of(point) * model.volume[point]);
+        }
+        let mass = reduce(self.comm, &mut mass)[0];
         let mut metadata = vec![
             ("title", self.problem.title.clone()),
             ("deck", text),
@@ -605,6 +612,7 @@ impl<'a> Job<'a> {
                 "out_of_plane_measure",
                 self.problem.dimension.out_of_plane_measure().to_string(),
             ),
+            ("mass", mass.to_string()),
             ("time_step", simulation.clock.step().to_string()),
         ];
         let more = self.options.attributes.iter();

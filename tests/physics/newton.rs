@@ -302,7 +302,7 @@ fn the_worst_point_is_named_where_halving_does_not_help() {
             " of loads and reactions, most of them ",
             " N at point ",
             " of body `b`, [",
-            "If the body can carry the loads, give [time.static] more `load_steps`, `max_iterations` or `max_halvings` or a larger `tolerance`, or use `method = \"relaxation\"`",
+            "If the body can carry the loads, give [time.static] more `load_steps`, `max_iterations` or `max_halvings`, or a larger `tolerance`; or use `method = \"relaxation\"`",
         ] {
             assert!(texts[0].contains(words), "{}", texts[0]);
         }
