@@ -38,7 +38,7 @@ pub enum Criterion {
     /// The numbers are the shares of points i and j, J/m⁶.
     Work([f64; 2], WorkRule),
     /// Same as [`Self::Work`], with the shares computed from the work thresholds of points i and j.
-    WorkThresholds(HorizonRatios, WorkRule, Directions),
+    WorkThresholds(EndRatios, WorkRule, Directions),
     /// Bonds break when their stress reaches this strength, Pa. The stress of a bond is the mean of the
     /// stress measures of the ends that act on the bond.
     Stress(f64, StressRule),
@@ -51,16 +51,16 @@ pub enum Criterion {
 /// factors multiply work thresholds; their square roots multiply stretch thresholds.
 pub type Directions = Option<[ToughnessByDirection; 2]>;
 
-/// Factors that convert a work threshold or a stretch threshold to another horizon. Entry `[e][k]` converts
-/// the threshold of point k to the horizon of end e; the factor between equal horizons is 1.
-pub type HorizonRatios = [[f64; 2]; 2];
+/// Factors that convert work thresholds or stretch thresholds to the ends of a bond. Entry `[e][k]` converts
+/// the threshold of point k to end e.
+pub type EndRatios = [[f64; 2]; 2];
 
 /// Conversion of the critical stretches of points i and j to the critical stretch of their bond, for ends
 /// with different horizons, moduli or damage laws.
 ///
-/// End e contributes ½ k_e w_e s² |ξ| to the energy of the bond. Here s is the stretch of the bond, k_e is the
-/// stiffness of this end, and w_e is its weight, see [`Weights`]. The weight is 0 beyond the horizon of the
-/// end.
+/// End e contributes ½ k_e w_e s² |ξ| to the energy of an elastic bond. Here s is the stretch of the bond,
+/// k_e is the stiffness of this end, and w_e is its weight, see [`Weights`]. The weight is 0 beyond the
+/// horizon of the end.
 ///
 /// If only end e acted, the bond would break at the stretch m_e = min_k r_ek t_k. The minimum is over the
 /// points k of the bond: k = i and k = j. Here t_k is the critical stretch of point k, and r_ek is the factor
@@ -73,7 +73,7 @@ pub struct StretchConversion {
     /// Entry `[e][k]` is r_ek: the critical stretch that follows from the fracture energy of point k with the
     /// law, the modulus and the horizon of end e, divided by the one with those of point k. There are two
     /// exceptions. If t_k is given in the deck, r_ek is 1. If t_k does not limit m_e, r_ek is ∞.
-    pub ratios: HorizonRatios,
+    pub ratios: EndRatios,
     /// Stiffnesses k_e, in any unit.
     pub stiffness: [f64; 2],
 }

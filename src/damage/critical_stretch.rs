@@ -2,8 +2,9 @@
 //!
 //! Silling & Askari 2005; Diehl & Schweitzer 2016, eq. 5. s0 is the critical stretch. s_min is the smallest
 //! stretch of the intact bonds of a point. f is the strength factor of the point, 1 without scatter. If
-//! points i and j of a bond have the same horizon and modulus, the smaller of their two thresholds holds for
-//! the bond. Both ends then use the same threshold. Otherwise,
+//! points i and j of a bond have the same law, modulus and horizon, or if the deck gives both critical
+//! stretches, the smaller of the two thresholds holds for the bond. Both ends then use the same threshold.
+//! Otherwise,
 //! [`StretchConversion`](crate::damage::StretchConversion) computes the threshold of the bond from the two
 //! thresholds. With α = 0, the criterion is the plain critical stretch of Dipasquale et al. 2014, eq. 6.
 //! [`Criterion::breaking`](crate::damage::Criterion::breaking) tests the criterion.

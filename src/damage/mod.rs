@@ -9,8 +9,8 @@ mod stress;
 
 pub use bond_energy::{BondEnergy, Calibration};
 pub use criterion::{
-    BreakableBonds, Criterion, Directions, Ends, HorizonRatios, Limits, StretchConversion,
-    WorkMeasure, WorkRule,
+    BreakableBonds, Criterion, Directions, EndRatios, Ends, Limits, StretchConversion, WorkMeasure,
+    WorkRule,
 };
 pub use critical_stretch::CriticalStretch;
 pub use direction::ToughnessByDirection;

@@ -16,8 +16,8 @@
 //! | `a && b` | from the left |
 //! | `a \|\| b` | from the left |
 //!
-//! The value of `!NaN` is NaN. The value of `a && b` is 0 if one of them is 0, and that of `a || b` is 1 if one
-//! of them is true; otherwise, both are NaN if one of them is NaN.
+//! The value of `!NaN` is NaN. The value of `a && b` is 0 if a or b is 0, and that of `a || b` is 1 if a or b
+//! is true. Otherwise, both are NaN if a or b is NaN.
 //!
 //! `and`, `or` and `not` are synonyms of `&&`, `||` and `!`. `not x < 1` reads like `not (x < 1)` but would
 //! mean `(not x) < 1`. Therefore a comparison that starts with `!` or `not` is an error: write `!(x < 1)`

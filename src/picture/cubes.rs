@@ -5,8 +5,8 @@ use super::colours::shaded;
 use super::points::{OVERLAP, edges};
 use super::projection::{Camera, Projection};
 
-/// Edge of the larger cube that is painted behind each cube, divided by the edge of the cube. The larger
-/// cubes fill the gaps between the cubes of a deformed body; see [`Scene::has_gaps`](super::Scene::has_gaps).
+/// Edge of the larger cube that is painted behind each cube, divided by the edge of the cube. If a body is
+/// deformed, there are gaps between its cubes; the larger cubes fill these gaps.
 const BACKING: f64 = 1.3;
 
 /// Smallest edge of a cube whose faces are painted, pixels. A smaller cube is painted as a square.
@@ -41,8 +41,8 @@ pub struct Cubes<'a> {
     /// the axis.
     cosines: [f64; 3],
     /// A larger cube is painted behind each cube, see [`BACKING`]. Along x, y and z: edge of the larger cube
-    /// minus edge of the cube, divided by the edge of the cube. `None` if there are no larger cubes.
-    growth: Option<[f64; 3]>,
+    /// minus edge of the cube, divided by the edge of the cube.
+    growth: [f64; 3],
     /// Surface that each pixel shows.
     surfaces: Vec<Surface>,
 }
@@ -58,8 +58,7 @@ struct Surface {
 }
 
 impl<'a> Cubes<'a> {
-    /// Create a painter. With `has_gaps`, a larger cube is painted behind each cube.
-    pub fn new(image: &'a mut Image, camera: Camera, has_gaps: bool) -> Self {
+    pub fn new(image: &'a mut Image, camera: Camera) -> Self {
         let pixels = image.width as usize * image.height as usize;
         let to_camera = camera.to_camera();
         let view = Projection::Orthographic(camera);
@@ -73,13 +72,13 @@ impl<'a> Cubes<'a> {
                 [across, -up]
             }),
             cosines,
-            growth: has_gaps.then_some(cosines.map(|cosine| {
+            growth: cosines.map(|cosine| {
                 // A face that is almost parallel to the direction of view comes nearer by a large distance if
                 // it moves outwards, so the larger cube extends less along the normal of this face.
                 let is_steep = (LEAST_COSINE..STEEP_COSINE).contains(&cosine);
                 let part = if is_steep { cosine / STEEP_COSINE } else { 1.0 };
                 part * (BACKING - 1.0)
-            })),
+            }),
             surfaces: vec![
                 Surface {
                     depth: f32::NEG_INFINITY,
@@ -105,10 +104,10 @@ impl<'a> Cubes<'a> {
         }
     }
 
-    /// Paint the visible faces of a cube and, if there are gaps, the visible faces of a larger cube behind
-    /// it. Each of the two cubes has at most three visible faces. `centre` is the position of the centre of
-    /// the cube, `depth` the depth of this centre, and `edge` the edge of the cube, all in pixels. A cube
-    /// with an edge below [`LEAST_CUBE`] is painted as a square.
+    /// Paint the visible faces of a cube, and the visible faces of a larger cube behind it. Each of the two
+    /// cubes has at most three visible faces. `centre` is the position of the centre of the cube, `depth` the
+    /// depth of this centre, and `edge` the edge of the cube, all in pixels. A cube with an edge below
+    /// [`LEAST_CUBE`] is painted as a square.
     pub fn paint(&mut self, (centre, depth): ([f64; 2], f64), edge: f64, colour: Colour) {
         if edge < LEAST_CUBE {
             let [columns, rows] = centre.map(|coordinate| edges(coordinate, edge, OVERLAP));
@@ -126,16 +125,15 @@ impl<'a> Cubes<'a> {
         }
         let overlap = 2.0 * OVERLAP;
         self.paint_box((centre, depth), edge, [edge + overlap; 3], colour);
-        let Some(growth) = self.growth else {
-            return;
-        };
         // If a face moves outwards by a distance d, its surface at a given pixel comes nearer to the camera
         // by d/c, where c is the cosine of the face. For the larger cube, d is half of the growth. The larger
         // cube is shifted back by 4/3 of the largest d/c, so it lies behind the faces of the cube itself. In
         // a gap, the larger cube hides the sides of other cubes.
-        let visible = self.visible().map(|axis| growth[axis] / self.cosines[axis]);
+        let visible = self
+            .visible()
+            .map(|axis| self.growth[axis] / self.cosines[axis]);
         let behind = depth - edge * visible.fold(0.0, f64::max) / 1.5;
-        let sizes = growth.map(|growth| (1.0 + growth) * edge + overlap);
+        let sizes = self.growth.map(|growth| (1.0 + growth) * edge + overlap);
         self.paint_box((centre, behind), edge, sizes, colour);
     }
 
@@ -240,7 +238,7 @@ mod tests {
     }
 
     fn paint_cube(image: &mut Image, centre: [f64; 2], edge: f64, colour: Colour) {
-        let mut cubes = Cubes::new(image, Camera::isometric(), true);
+        let mut cubes = Cubes::new(image, Camera::isometric());
         cubes.paint((centre, 0.0), edge, colour);
         cubes.shade();
     }
@@ -263,7 +261,7 @@ mod tests {
         let mut pictures = Vec::new();
         for order in [[0, 1, 2], [2, 1, 0], [1, 2, 0]] {
             let mut image = Image::new(120, 120);
-            let mut cubes = Cubes::new(&mut image, Camera::isometric(), true);
+            let mut cubes = Cubes::new(&mut image, Camera::isometric());
             for cube in order {
                 let (centre, edge, colour) = [large, behind, before][cube];
                 cubes.paint(centre, edge, colour);
@@ -293,13 +291,11 @@ mod tests {
 
     #[test]
     fn a_layer_of_cubes_has_an_even_face_from_any_side() {
-        let cameras = [(-45.0, 35.0), (200.0, -25.0), (10.0, 15.0), (-90.0, 90.0)];
-        let all = cameras.map(|camera| [(camera, true), (camera, false)]);
-        for ((azimuth, elevation), has_gaps) in all.into_iter().flatten() {
+        for (azimuth, elevation) in [(-45.0, 35.0), (200.0, -25.0), (10.0, 15.0), (-90.0, 90.0)] {
             let camera = Camera::new(azimuth, elevation);
             let view = Projection::Orthographic(camera);
             let mut image = Image::new(400, 400);
-            let mut cubes = Cubes::new(&mut image, camera, has_gaps);
+            let mut cubes = Cubes::new(&mut image, camera);
             let edge = 10.3;
             let pixel = |place: [f64; 3]| {
                 let [across, up] = view.project(place);
@@ -323,10 +319,9 @@ mod tests {
 
     #[test]
     fn a_camera_sees_up_to_three_faces() {
-        let faces = |azimuth, elevation, has_gaps| {
+        let faces = |azimuth, elevation| {
             let mut image = Image::new(60, 60);
-            let camera = Camera::new(azimuth, elevation);
-            let mut cubes = Cubes::new(&mut image, camera, has_gaps);
+            let mut cubes = Cubes::new(&mut image, Camera::new(azimuth, elevation));
             cubes.paint(([30.0, 30.0], 0.0), 30.0, RED);
             cubes.shade();
             let mut colours: Vec<Colour> = image
@@ -342,21 +337,17 @@ mod tests {
         };
         let [x, y, z] = BRIGHTNESS.map(|brightness| shaded(RED, brightness));
         // The edge of the larger cube is 1.3 · 30 pixels plus the overlap.
-        assert_eq!(faces(0.0, 0.0, true), (vec![x], 40 * 40));
-        assert_eq!(faces(90.0, 0.0, true), (vec![y], 40 * 40));
-        assert_eq!(faces(-90.0, -90.0, true), (vec![z], 40 * 40));
-        assert_eq!(faces(45.0, 0.0, true).0, [x, y]);
-        assert_eq!(faces(200.0, -20.0, true).0, [x, y, z]);
-        // Without gaps, there is only the cube with its overlap of half a pixel on each side.
-        let (colours, pixels) = faces(0.0, 0.0, false);
-        assert_eq!(colours, [x]);
-        assert!((30 * 30..=32 * 32).contains(&pixels), "{pixels}");
+        assert_eq!(faces(0.0, 0.0), (vec![x], 40 * 40));
+        assert_eq!(faces(90.0, 0.0), (vec![y], 40 * 40));
+        assert_eq!(faces(-90.0, -90.0), (vec![z], 40 * 40));
+        assert_eq!(faces(45.0, 0.0).0, [x, y]);
+        assert_eq!(faces(200.0, -20.0).0, [x, y, z]);
     }
 
     #[test]
     fn neighbouring_cubes_show_no_hairlines() {
         let mut image = Image::new(300, 300);
-        let mut cubes = Cubes::new(&mut image, Camera::isometric(), true);
+        let mut cubes = Cubes::new(&mut image, Camera::isometric());
         for index in 0..20 {
             // The distances between the cubes are stretched by a tenth.
             let y = 1.1 * 10.3 * f64::from(index);
@@ -376,7 +367,7 @@ mod tests {
     #[test]
     fn steps_of_a_slope_show_no_specks() {
         let mut image = Image::new(300, 300);
-        let mut cubes = Cubes::new(&mut image, Camera::isometric(), true);
+        let mut cubes = Cubes::new(&mut image, Camera::isometric());
         let edge = 4.4;
         for index in 0..60 * 60 {
             let [x, y] = [index % 60 - 30, index / 60 - 30].map(|k| edge * f64::from(k));

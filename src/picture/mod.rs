@@ -8,7 +8,6 @@
 //!     positions: &[[0.0, 0.0, 0.0], [0.001, 0.0, 0.0]],
 //!     sizes: &[0.001, 0.001],
 //!     scattered: &[],
-//!     has_gaps: false,
 //!     values: &[0.0, 0.4],
 //!     field: "damage",
 //!     unit: "",
@@ -98,14 +97,7 @@ pub fn render(scene: &Scene) -> Result<Image> {
             let are_cells = move |mark: &Mark| (are_flat && mark.scattered) == scattered;
             marks.iter().filter(are_cells)
         });
-        points::paint(
-            pen.image,
-            others,
-            colouring,
-            &layout,
-            projection,
-            scene.has_gaps,
-        );
+        points::paint(pen.image, others, colouring, &layout, projection);
         cells::paint(
             pen.image,
             scattered,

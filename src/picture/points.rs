@@ -61,18 +61,17 @@ const TOLERANCE: f64 = 0.01;
 const STRIP_HEIGHT: f64 = 1.9;
 
 /// Paint the cells of points: squares in flat views, cubes in orthographic views, and rectangles with the
-/// height of the strip in 1-D. With `has_gaps`, larger cubes fill the gaps between the cubes. In orthographic
-/// views, a nearer point covers a farther point. In the other views, a later point covers an earlier point.
+/// height of the strip in 1-D. In orthographic views, a nearer point covers a farther point. In the other
+/// views, a later point covers an earlier point.
 pub fn paint(
     image: &mut Image,
     marks: impl Iterator<Item = Mark> + Clone,
     colouring: Colouring,
     layout: &Layout,
     projection: Projection,
-    has_gaps: bool,
 ) {
     if let Projection::Orthographic(camera) = projection {
-        let mut cubes = Cubes::new(image, camera, has_gaps);
+        let mut cubes = Cubes::new(image, camera);
         // The depth buffer stores 4-byte floats. Depths relative to the first point have enough digits even
         // if the body is far from the origin.
         let mut first = None;

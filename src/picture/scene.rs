@@ -70,9 +70,6 @@ pub struct Scene<'a> {
     /// body has scattered points. In flat views, scattered points are drawn as Voronoi cells, and other
     /// points as squares.
     pub scattered: &'a [bool],
-    /// There can be gaps between the cells, because the body is deformed, its points are scattered or its
-    /// grid is refined. In orthographic views, a larger cube behind each point then fills these gaps.
-    pub has_gaps: bool,
     /// Value of each point; the value determines the colour. A point whose value is NaN is grey, or pale blue
     /// if the colour map is grey.
     pub values: &'a [f64],
@@ -390,7 +387,6 @@ mod tests {
             positions,
             sizes: &SIZES,
             scattered: &[],
-            has_gaps: true,
             values,
             field: "velocity",
             unit: "m/s",

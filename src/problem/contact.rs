@@ -89,6 +89,7 @@ impl ContactRule {
             restitution: 1.0,
         }
     }
+
     fn has_friction(&self) -> bool {
         self.static_friction > 0.0 || self.kinetic_friction > 0.0
     }

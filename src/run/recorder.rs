@@ -269,12 +269,6 @@ impl<'a> Recorder<'a> {
         self.energy.check_end(row, StepKinds::of(problem))
     }
 
-    /// Return the row of the history at the current step; `None` if no row was due.
-    pub fn row_of(&self, clock: &Clock) -> Option<&HistoryRow> {
-        let is_now = |row: &&HistoryRow| row.number == clock.number();
-        self.last_row.as_ref().filter(is_now)
-    }
-
     /// Write the state of a failed run to the files that have no output at this step, and fsync all files.
     /// Collective.
     ///

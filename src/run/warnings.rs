@@ -15,14 +15,14 @@ use crate::solver::{Simulation, Stepper};
 /// printed.
 const MAX_INERTIA: f64 = 0.05;
 
-/// Ratio of overshoot to fracture energy above which a run with time steps prints a warning. For comparison: a run with a
-/// branching crack at `safety = 0.8` has a ratio of 0.4. With a quarter of the time step, the fracture energy
-/// of this run changes by 1 %.
+/// Ratio of overshoot to fracture energy above which a run with time steps prints a warning. For comparison:
+/// a run with a branching crack at `safety = 0.8` has a ratio of 0.4. With a quarter of the time step, the
+/// fracture energy of this run changes by 1 %.
 const MAX_OVERSHOOT: f64 = 0.5;
 
 /// Ratio of overshoot to fracture energy above which a run with load steps only prints a warning. In most
-/// runs with a single crack that grows through equilibria, the ratio is 0.05 to 0.2. A larger ratio means that
-/// a load step breaks bonds in a region that earlier breaks would have unloaded, or that a crack grows
+/// runs with a single crack that grows through equilibria, the ratio is 0.05 to 0.2. A larger ratio means
+/// that a load step breaks bonds in a region that earlier breaks would have unloaded, or that a crack grows
 /// unstably.
 const MAX_OVERSHOOT_OF_LOAD_STEPS: f64 = 0.25;
 

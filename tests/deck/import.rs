@@ -406,8 +406,8 @@ PeriLab:
         Temperature: True
 "#;
 
-/// PeriLab computes Young's modulus of bonds from one constant and a fixed Poisson's ratio: 1/3 in plane stress
-/// and plane strain, 1/4 in 3-D.
+/// PeriLab computes Young's modulus of bonds from one constant and a fixed Poisson's ratio: 1/3 in plane
+/// stress and plane strain, 1/4 in 3-D.
 #[test]
 fn bonds_of_perilab_have_a_fixed_poisson_ratio() {
     let folder = Folder::strip("fixed-ratio");
@@ -540,8 +540,8 @@ fn numbers_of_perilab_without_a_point_are_dropped() {
     assert_eq!(error.lines().next(), Some(message));
 }
 
-/// PeriLab uses constants of 3-D for a plane material without `Symmetry`. The import assumes plane stress, and
-/// a warning says so.
+/// PeriLab uses constants of 3-D for a plane material without `Symmetry`. The import assumes plane stress,
+/// and a warning says so.
 #[test]
 fn a_plane_material_of_perilab_without_symmetry_is_named() {
     let folder = Folder::strip("symmetry");
@@ -560,10 +560,10 @@ fn a_plane_material_of_perilab_without_symmetry_is_named() {
     assert!(note.contains("constants of 3-D"), "{note}");
 }
 
-/// Contact of PeriLab: one force density 9 κ/(π δ⁵) (R − r) V for each pair of points, with the horizon δ of the
-/// slave block, or 9 κ/(π δ³) or 48 κ/(5 π δ³) with `Symmetry`. The new deck has the same spring constants:
-/// 18 S/(π δ⁵) in 3-D, 9 S/(π δ⁴) in plane stress and 72 S/(5 π δ⁴) in plane strain, with the `stiffness` S and
-/// the smaller horizon δ.
+/// Contact of PeriLab: one force density 9 κ/(π δ⁵) (R − r) V for each pair of points, with the horizon δ of
+/// the slave block, or 9 κ/(π δ³) or 48 κ/(5 π δ³) with `Symmetry`. The new deck has the same spring
+/// constants: 18 S/(π δ⁵) in 3-D, 9 S/(π δ⁴) in plane stress and 72 S/(5 π δ⁴) in plane strain, with the
+/// `stiffness` S and the smaller horizon δ.
 #[test]
 fn contact_of_perilab_has_its_spring_constant() {
     let folder = Folder::strip("contact");

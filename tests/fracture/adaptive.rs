@@ -83,8 +83,8 @@ fn steps_that_are_long_for_bonds_that_break_are_told() {
     assert!(!warned("safety = 0.8", &["--quiet"]));
 }
 
-/// All bonds of a bar reach their criterion at the same time. With one load step, they break at 1.34 times their
-/// critical stretch.
+/// All bonds of a bar reach their criterion at the same time. With one load step, they break at 1.34 times
+/// their critical stretch.
 #[test]
 fn load_steps_that_are_long_for_bonds_that_break_are_told() {
     let folder = Folder::new("overshoot_of_load_steps");
@@ -146,8 +146,11 @@ fn a_kink_of_a_support_does_not_spoil_the_energy_balance() {
         "displacement = ['0.01*max(t - 2.15, 0)']",
         "velocity = ['0.01*step(t - 2.05)']",
         "displacement = ['1e-3*min(t, 2)^2 + 4e-3*max(t - 2, 0)']",
+        // The motion ends with the run.
+        "displacement = ['0.01*4*ramp(t, 2, 6)']",
     ] {
         let [fixed, adaptive] = ["step = 0.2", adaptive].map(|time| error(motion, time));
+        assert!(fixed < 0.01, "{motion}: {fixed:e}");
         assert!(
             adaptive < 1.1 * fixed,
             "{motion}: {adaptive:e}, fixed {fixed:e}"

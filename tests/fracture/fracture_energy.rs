@@ -651,8 +651,8 @@ fn in_a_pair_of_unlike_bodies() {
         opening_cost(&text, 6.0)
     };
     let hard = PMB.replace("3e3", "12e3");
-    // An independent program has summed ¼ Σ_e k_e w_e m_e² |ξ| V_i V_j over the bonds of the two grids. Bonds are
-    // missing at the left and right sides, so the sums do not converge to 1 but to a smaller value.
+    // An independent program has summed ¼ Σ_e k_e w_e m_e² |ξ| V_i V_j over the bonds of the two grids. Bonds
+    // are missing at the left and right sides, so the sums do not converge to 1 but to a smaller value.
     for (spacing, sum) in [(1.0, 1.01697), (0.5, 0.97600)] {
         let cost = cost([PMB, &hard], STRETCH, spacing);
         assert!((cost - sum).abs() < 2e-4, "{spacing}: {cost}");
@@ -781,7 +781,7 @@ fn between_bars_of_different_horizons_with_volume_correction() {
 #[test]
 fn between_bars_of_different_moduli() {
     // The sum over the bonds of a uniform bar is 19/18 of the fracture energy.
-    let costs = |rule: &str, tougher: &str| {
+    let costs = |rule: &str, tougher: &str, interface: &str| {
         let bars = format!(
             "dimension = '1d'
             constraint = 'uniaxial-stress'
@@ -792,6 +792,7 @@ fn between_bars_of_different_moduli() {
             damage.tough.{rule} = {{ fracture_energy = '4*{FRACTURE_ENERGY}' }}
             body.left = {{ material = 'soft', damage = 'brittle', shape.box = {{ lower = [-6], upper = [0] }} }}
             body.right = {{ material = 'hard'{tougher}, shape.box = {{ lower = [0], upper = [6] }} }}
+            interface.rule = '{interface}'
             [time]
             end = 1
             "
@@ -800,11 +801,11 @@ fn between_bars_of_different_moduli() {
     };
     for rule in [STRETCH, ENERGY] {
         for tougher in [", damage = 'brittle'", ", damage = 'tough'", ""] {
-            let cost = costs(rule, tougher);
-            assert!(
-                (cost * 18.0 / 19.0 - 1.0).abs() < 1e-3,
-                "{rule} {tougher}: {cost}"
-            );
+            for interface in ["own", "average", "minimum"] {
+                let cost = costs(rule, tougher, interface);
+                let case = format!("{rule} {tougher} {interface}: {cost}");
+                assert!((cost * 18.0 / 19.0 - 1.0).abs() < 1e-3, "{case}");
+            }
         }
     }
 }

@@ -34,8 +34,6 @@ pub struct Painter<'a> {
     /// Result that is subtracted from the drawn result.
     pub(super) minus: Option<Subtrahend>,
     has_displacement: bool,
-    /// Whether the result has refinement levels.
-    is_refined: bool,
     pub(super) out_of_plane_measure: f64,
     range: Range,
     colours: Option<ColourMap>,
@@ -153,7 +151,6 @@ impl<'a> Painter<'a> {
             quantity,
             minus,
             has_displacement: fields.iter().any(|field| field.name == "displacement"),
-            is_refined: fields.iter().any(|field| field.name == "level"),
             out_of_plane_measure,
             range,
             clips: clips.collect::<Result<_>>()?,
@@ -300,13 +297,6 @@ impl<'a> Painter<'a> {
         Ok(Some(quantity.of(values)))
     }
 
-    /// Test whether there can be gaps between the drawn cells: true for a deformed body, for scattered points
-    /// and for a refined grid.
-    fn has_gaps(&self) -> bool {
-        let is_deformed = self.has_displacement && self.factor != 0.0;
-        is_deformed || self.is_refined || self.scattered.contains(&true)
-    }
-
     /// Read the points of an output, in chunks of consecutive points to limit the memory. Keep only the
     /// points in the slice, in the half spaces and in the range of the threshold.
     pub(super) fn points(&self, index: usize) -> Result<Points> {
@@ -374,7 +364,6 @@ impl<'a> Painter<'a> {
             positions: &points.positions,
             sizes: &points.sizes,
             scattered: &points.scattered,
-            has_gaps: self.has_gaps(),
             values: &points.values,
             field: &self.quantity.label,
             unit: &self.quantity.unit,

@@ -248,7 +248,8 @@ pub(super) fn write_material(
 }
 
 /// Write the stress of a correspondence law. PeriLab takes C:E as the Cauchy stress, with the Green–Lagrange
-/// strain E. In the new deck, bodies that yield and bodies that expand in plane strain do not have this stress.
+/// strain E. In the new deck, bodies that yield and bodies that expand in plane strain do not have this
+/// stress.
 fn write_stress(
     translation: &Translation,
     model: &Model,

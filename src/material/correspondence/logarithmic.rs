@@ -24,8 +24,8 @@ const MOST_SWEEPS: usize = 30;
 /// entries, and a is the sum of the squares of all nine entries.
 const CONVERGED: f64 = 1e-32;
 
-/// Largest difference of det C_p⁻¹ from 1 that counts as round-off. In a metal, this difference corresponds to
-/// a pressure below 100 Pa.
+/// Largest difference of det C_p⁻¹ from 1 that counts as round-off. In a metal, this difference corresponds
+/// to a pressure below 100 Pa.
 const ROUND_OFF: f64 = 1e-9;
 
 /// Elastic trial state of a point, before any flow.
@@ -109,9 +109,9 @@ pub fn out_of_plane_stress<const D: usize>(
     Some(trial.tensor(&stress.diagonal())[(2, 2)])
 }
 
-/// Divide C_p⁻¹ by the cube root of its determinant. Plastic flow preserves volume, so the determinant of each
-/// C_p⁻¹ is 1, but the determinant of a mean of different C_p⁻¹ is not. `entries` are those of C_p⁻¹ − I. They
-/// do not change if the determinant is 1 except for round-off.
+/// Divide C_p⁻¹ by the cube root of its determinant. Plastic flow preserves volume, so the determinant of
+/// each C_p⁻¹ is 1, but the determinant of a mean of different C_p⁻¹ is not. `entries` are those of C_p⁻¹ −
+/// I. They do not change if the determinant is 1 except for round-off.
 pub fn restore_volume(entries: &mut [f64; 6]) {
     let one = Matrix3::identity();
     let inverse = one + tensor_of(entries);

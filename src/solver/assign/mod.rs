@@ -5,7 +5,7 @@ mod possible;
 use std::fmt;
 
 use crate::damage::{
-    BondEnergy, Criterion, CriticalStretch, DamageLaw, HorizonRatios, StressLimit, StressMeasure,
+    BondEnergy, Criterion, CriticalStretch, DamageLaw, EndRatios, StressLimit, StressMeasure,
     StressRule, StretchConversion, ToughnessByDirection, WorkRule,
 };
 use crate::dimension::Dimension;
@@ -319,9 +319,6 @@ fn stretch_ratio(problem: &Problem, [to, from]: [usize; 2], constants: Constants
     let Some(energy) = damage.and_then(|damage| fracture_energy(problem, damage, elastic)) else {
         return 1.0;
     };
-    if to.body.name == from.body.name {
-        return (from.horizon / constants.horizon).sqrt();
-    }
     let at = |block: &Block, constants: Constants| {
         critical_stretch(problem, block.body, damage, constants, energy)
     };
@@ -369,7 +366,7 @@ fn criterion(
     let work = |horizon: f64| BondEnergy::from_energy(problem.dimension, 1.0, horizon);
     let of_block = ends.map(|block| work(problem.block(block).horizon));
     let ratios = horizons.map(|horizon| of_block.map(|block| work(horizon) / block));
-    let stretch_ratios: HorizonRatios = [0, 1].map(|end| {
+    let stretch_ratios: EndRatios = [0, 1].map(|end| {
         [0, 1].map(|k| stretch_ratio(problem, [ends[end], ends[k]], of_ends[end].constants))
     });
     let conversion = (stretch_ratios != [[1.0; 2]; 2]).then_some(StretchConversion {

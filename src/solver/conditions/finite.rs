@@ -15,9 +15,9 @@ use super::members;
 /// Words before the value in the messages about vector components.
 const COMPONENTS: [&str; 3] = ["component x is", "component y is", "component z is"];
 
-/// Check that the values of all conditions that act in a stage are finite at `time` (s) at all of their points,
-/// and that thermal stretches are above −1. `stage` is the index of the stage. At time 0, also check that all
-/// initial values are finite. Collective.
+/// Check that the values of all conditions that act in a stage are finite at `time` (s) at all of their
+/// points, and that thermal stretches are above −1. `stage` is the index of the stage. At time 0, also check
+/// that all initial values are finite. Collective.
 ///
 /// # Errors
 /// If a value is not finite, or a thermal stretch is −1 or less. The message names the first entry of the
@@ -185,10 +185,10 @@ impl<const D: usize> FiniteCheck<'_, D> {
         Err(Error::input(message).at(place))
     }
 
-    /// Return an error if a component is not finite at a point of a set; for `None`, at any point. `components`
-    /// contains an expression and a factor for each component. The component is the product of both. `names` has one entry per
-    /// component, such as "component x is". In the error message, the entry of the component precedes its
-    /// value. Collective.
+    /// Return an error if a component is not finite at a point of a set; for `None`, at any point.
+    /// `components` contains an expression and a factor for each component. The component is the product of
+    /// both. `names` has one entry per component, such as "component x is". In the error message, the entry
+    /// of the component precedes its value. Collective.
     fn check_values<'e>(
         &self,
         key: &str,

@@ -66,10 +66,9 @@ pub enum Work {
     /// In an explicit step: for loads, as [`Self::Trapezoid`]; for supports, the change of the kinetic energy
     /// minus the work of the other forces g: ½ ρ (u̇·u̇ − u̇₀·u̇₀) V − ½ (g₀ + g)·(u − u₀) V.
     ///
-    /// If the velocity of a support jumps from 0 to w at a step, its velocity is ½ w at this time. The
-    /// trapezoidal rule would then give a kinetic energy of ½ ρ w² too early or too late, so the energy
-    /// balance would not close at this time. If the next step had another length, the balance would not close
-    /// afterwards either.
+    /// If the velocity of a support jumps, the trapezoidal rule would add part of the kinetic energy one step
+    /// too early or too late, so the energy balance would not close at this time. If the next step had
+    /// another length, the balance would not close afterwards either.
     Step,
 }
 
@@ -435,11 +434,11 @@ impl<const D: usize> Conditions<D> {
     }
 
     /// Return an upper estimate of the kinetic energy (J) that loads and prescribed motions add in one step,
-    /// but that is not part of the recorded work. `step` is the length of the step, s. The work is
-    /// integrated by the trapezoidal rule, which misses this energy. A load contributes the energy that it
-    /// adds in one step to points initially at rest. A supported component contributes the kinetic energy of
-    /// its velocity. It also contributes the energy that a point initially at rest gains from the prescribed
-    /// acceleration in one step.
+    /// but that is not part of the recorded work. `step` is the length of the step, s. The work of a load is
+    /// integrated by the trapezoidal rule, which misses the energy that the load adds in one step to points
+    /// initially at rest. The works of several supports can cancel. A supported component therefore
+    /// contributes the kinetic energy of its velocity, and the energy that a point initially at rest gains
+    /// from the prescribed acceleration in one step.
     ///
     /// Verlet conserves ½ ρ u̇² − Δt² f²/8ρ instead of ½ ρ u̇². So when the force density on a point jumps
     /// from 0 to f, the energy ½ ρ u̇² jumps by Δt² f²/8ρ. Internal forces are excluded, because they grow

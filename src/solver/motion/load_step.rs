@@ -52,9 +52,9 @@ pub struct LoadStep {
     /// Number of iterations in this load step since bonds last broke. If no bonds have broken in this load
     /// step, the number of all its iterations.
     pub since_breaking: u64,
-    /// ‖f‖ divided by ‖loads‖ + ‖reactions‖ (at least `scale`), where f is the total force on a point. Without
-    /// loads, the smaller of this ratio and ‖f‖ + ‖reactions‖ divided by `start`. The residual is 0 if f is
-    /// round-off, and NaN before the first load step.
+    /// ‖f‖ divided by ‖loads‖ + ‖reactions‖ (at least `scale`), where f is the total force on a point.
+    /// Without loads, the smaller of this ratio and ‖f‖ + ‖reactions‖ divided by `start`. The residual is 0
+    /// if f is round-off, and NaN before the first load step.
     pub residual: f64,
     /// Damping c of a relaxation, see [`super::relaxation`]; NaN if all points are at rest.
     pub(super) damping: f64,
@@ -106,8 +106,8 @@ impl LoadStep {
         let [free, loads, reactions, stiffness] = squares.map(f64::sqrt);
         let to_exerted = free / (loads + reactions).max(self.scale);
         let to_start = (free + reactions) / self.start;
-        // A large force at the start must not hide a small load. False if a ratio is NaN. The residual is then
-        // NaN, and the load step fails.
+        // A large force at the start must not hide a small load. False if a ratio is NaN. The residual is
+        // then NaN, and the load step fails.
         self.is_relative_to_start = loads == 0.0 && to_start < to_exerted;
         self.residual = if free <= ROUND_OFF * stiffness {
             0.0
