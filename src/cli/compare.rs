@@ -17,8 +17,8 @@ use super::{Verbosity, outln, print, result_file, without_output};
 ///
 /// Matches outputs and history rows by time, and points by id. For each field and history column, prints the
 /// largest difference with its point and time. Also prints the ratio of this difference to the largest
-/// absolute value in A. The terms of a total momentum can cancel, so the ratio for momentum is to √(2 M E) if
-/// this is larger, with the mass M and the largest kinetic energy E of A. Does not compare attributes, which
+/// absolute value in A. The terms of a total momentum can cancel. The divisor of momentum is therefore at
+/// least √(2 M E), with the mass M and the largest kinetic energy E of A. Does not compare attributes, which
 /// describe the run.
 #[derive(Args)]
 #[command(after_help = "\

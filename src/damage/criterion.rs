@@ -29,9 +29,8 @@ pub enum Criterion {
     /// [`StretchConversion`] converts these stretches to the critical stretch of the bond. A block
     /// without critical stretch has the value ∞.
     StretchBetween([f64; 2], StretchConversion),
-    /// Same as [`Self::Thresholds`], for thresholds of points i and j that belong to different horizons or
-    /// moduli.
-    /// [`StretchConversion`] converts these thresholds to the critical stretch of the bond.
+    /// Same as [`Self::Thresholds`], for ends with different laws, moduli or horizons. [`StretchConversion`]
+    /// converts the thresholds of both points to the critical stretch of the bond.
     ThresholdsBetween(StretchConversion, Directions),
     /// Bonds break when their work reaches their critical work. Each end that acts on a bond adds the work of
     /// its force state to the work of the bond. The end also adds its share to the critical work of the bond.
@@ -70,9 +69,10 @@ pub type EndRatios = [[f64; 2]; 2];
 /// reaches Σ ½ k_e w_e m_e² |ξ|. The critical stretch s is therefore given by s² = Σ k_e w_e m_e²/Σ k_e w_e.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StretchConversion {
-    /// Entry `[e][k]` is r_ek: the critical stretch that follows from the fracture energy of point k with the
-    /// law, the modulus and the horizon of end e, divided by the one with those of point k. There are two
-    /// exceptions. If t_k is given in the deck, r_ek is 1. If t_k does not limit m_e, r_ek is ∞.
+    /// Entry `[e][k]` is r_ek. It is the ratio of two critical stretches, which both follow from the fracture
+    /// energy of point k: the first with the law, the modulus and the horizon of end e, the second with those
+    /// of point k. There are two exceptions. If t_k is given in the deck, r_ek is 1. If t_k does not limit
+    /// m_e, r_ek is ∞.
     pub ratios: EndRatios,
     /// Stiffnesses k_e, in any unit.
     pub stiffness: [f64; 2],

@@ -121,7 +121,8 @@ pub(super) const UNCORRECTED_SURFACE: &str = "bond forces are not multiplied by 
 pub(super) const UNDAMPED_DAMAGE: &str =
     "the motion of damaged points is not damped, so cracks may grow faster or branch";
 
-/// Log notes for keys with other results in the new deck. A warning repeats these notes with their lines.
+/// Log notes for keys whose results in the new deck differ from those of the source deck. A warning repeats
+/// these notes with the lines of the keys.
 const CONSEQUENCES: [&str; 6] = [
     SHORT_CONTACT,
     DOUBLED_SHEAR,
@@ -160,7 +161,7 @@ pub struct Losses {
     pub unordered_initials: Vec<usize>,
     /// Lines of damage models whose compressed bonds do not break in the new deck.
     pub intact_compressed: Vec<usize>,
-    /// Notes on keys with other results in the new deck, and the lines of these keys.
+    /// Notes on keys whose results in the new deck differ, each with the line of its key.
     pub consequences: Vec<(&'static str, usize)>,
 }
 

@@ -70,8 +70,8 @@ pub struct Difference {
     /// Largest absolute difference; infinite if the values of a pair differ and at least one of them is not
     /// finite.
     pub largest: f64,
-    /// Largest finite absolute value in the first result. For momentum and angular momentum, the scale is at
-    /// least a sum over the points without cancellation, if the first result has its terms.
+    /// Largest finite absolute value in the first result. For momentum and angular momentum, this value can
+    /// be round-off, so the scale is raised; see `raise_momentum_scales`.
     pub scale: f64,
     /// Number of compared values.
     pub values: u64,
@@ -547,9 +547,9 @@ fn compare_histories(histories: [&[StoredColumn]; 2], comparison: &mut Compariso
     }
 }
 
-/// Return √(2 M E), a momentum without cancellation, kg m/s. M is the mass of the points of the first result,
-/// and E the largest kinetic energy in its history. Σ m |u̇| is at most this value. Return `None` if the
-/// first result lacks M or E.
+/// Return √(2 M E), kg m/s, an upper bound of Σ m |u̇|. In contrast to the total momentum, this value does
+/// not cancel. M is the mass of the points of the first result, and E the largest kinetic energy in its
+/// history. Return `None` if the first result lacks M or E.
 fn momentum_scale(mass: Option<f64>, history: &[StoredColumn]) -> Option<f64> {
     let energies = history.iter().find(|column| column.name == KINETIC_ENERGY);
     let energies = energies?.values.iter().copied();

@@ -134,8 +134,8 @@ pub fn render(scene: &Scene) -> Result<Image> {
 /// Colours of lines, distinguishable with colour blindness (Okabe & Ito 2008).
 const LINE_COLOURS: [Colour; 3] = [[0, 114, 178], [0, 158, 115], [204, 121, 167]];
 
-/// Draw the lines of a scene over its points, as far as they lie inside the frame. The number of a line
-/// selects its colour.
+/// Draw the lines of a scene over its points. Parts of lines outside the frame are not drawn. The index of a
+/// line selects its colour.
 fn lines(pen: &mut Pen, layout: &Layout, projection: Projection, scene: &Scene) {
     let thickness = 2.0 * pen.thickness();
     for (number, line) in scene.lines {

@@ -106,7 +106,7 @@ impl EnergyWatch {
         }
     }
 
-    /// Encode the state for a checkpoint, without the round-off of the energy.
+    /// Encode the state for a checkpoint. `floor` is not included; [`Self::new`] recomputes it.
     pub fn words(&self) -> [u64; 7] {
         [
             self.input.to_bits(),
@@ -365,7 +365,8 @@ mod tests {
             after
         };
         let clock = Clock::new(1.0, 1.0);
-        // The error of load steps before the restart is no gain of the time steps after it.
+        // The energy error of load steps before the restart does not count as an energy gain of later time
+        // steps.
         let mut before = watch();
         before.note_load_step(&row(200.0));
         let found = restarted(&before).check(&row(200.5), &clock, 1.0, true);

@@ -33,7 +33,7 @@ pub fn describe(problem: &Problem, deck: Option<&str>) -> String {
     problem.time.end = 0.0;
     problem.further_outputs.clear();
     problem.output = Output::default();
-    // The interval of the rows may change without a new result.
+    // A restart may change the interval of history rows without starting a new result file.
     let history = History {
         every: None,
         ..std::mem::take(&mut problem.history)

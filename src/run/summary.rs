@@ -46,8 +46,8 @@ pub struct Phases {
     pub halo: f64,
     /// Contact search and contact forces.
     pub contact: f64,
-    /// The rest of the steps: integration, conditions, the solution of load steps, and copies of
-    /// displacements to the arrays of the bond loops.
+    /// Parts of steps that are in no other phase: integration, conditions, the solution of load steps, and
+    /// copies of displacements to the arrays of the bond loops.
     pub motion: f64,
     /// Refinement and rebalancing.
     pub regridding: f64,

@@ -20,10 +20,10 @@ const MAX_INERTIA: f64 = 0.05;
 /// fracture energy of this run changes by 1 %.
 const MAX_OVERSHOOT: f64 = 0.5;
 
-/// Ratio of overshoot to fracture energy above which a run with load steps only prints a warning. In most
-/// runs with a single crack that grows through equilibria, the ratio is 0.05 to 0.2. A larger ratio means
-/// that a load step breaks bonds in a region that earlier breaks would have unloaded, or that a crack grows
-/// unstably.
+/// Ratio of overshoot to fracture energy above which a warning is printed, in a run with load steps only. In
+/// most runs with a single crack that grows through equilibria, the ratio is 0.05 to 0.2. A larger ratio has
+/// two possible causes. A load step breaks bonds that earlier breaks would have unloaded if the load steps
+/// were shorter, or a crack grows unstably within a load step.
 const MAX_OVERSHOOT_OF_LOAD_STEPS: f64 = 0.25;
 
 /// Overlap of two points, as a fraction of their contact distance, above which a warning is printed. At 1,

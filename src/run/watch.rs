@@ -187,7 +187,7 @@ impl<'a> Watch<'a> {
             let reserve = (RESERVED_FRACTION * limit).clamp(MIN_RESERVE, MAX_RESERVE);
             start.elapsed().as_secs_f64() + reserve + 2.0 * self.cost.as_secs_f64() >= limit
         });
-        // The request is taken also if a checkpoint is due, which fulfils the request.
+        // Clear the request also if a checkpoint is due anyway, because this checkpoint fulfils the request.
         let is_requested = self.signals.is_some_and(Signals::take_request);
         let flag = |set: bool| f64::from(u8::from(set));
         let requests = observer.entries();

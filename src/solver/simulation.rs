@@ -98,8 +98,8 @@ pub struct Times {
     pub forces: ForceTimes,
     /// Contact search and contact forces.
     pub contact: Duration,
-    /// The rest of the steps: integration, conditions, and the solution of load steps. This includes the time
-    /// to copy displacements and thermal stretches for the bond passes.
+    /// Parts of steps that are in no other phase: integration, conditions, and the solution of load steps.
+    /// This includes the time to copy displacements and thermal stretches for the bond passes.
     pub motion: Duration,
     /// Number of force evaluations in the time loop.
     pub evaluations: u64,
@@ -110,7 +110,7 @@ pub struct Times {
 /// Start of a phase, see [`Times::start`].
 pub(super) struct PhaseStart {
     start: Instant,
-    /// Time of all phases of the time loop at the start.
+    /// Value of [`Times::counted`] at the start of the phase.
     counted: Duration,
 }
 
@@ -123,8 +123,8 @@ impl Times {
         }
     }
 
-    /// Time since the start of a phase, without the phases that have been counted since. Therefore no time
-    /// counts twice.
+    /// Time since the start of a phase, minus the time that other phases have counted since then. No time is
+    /// therefore counted twice.
     pub(super) fn since(&self, phase: &PhaseStart) -> Duration {
         let others = self.counted() - phase.counted;
         phase.start.elapsed().saturating_sub(others)

@@ -134,7 +134,7 @@ fn a_tip_on_another_crack_than_the_one_at_its_start_is_told() {
     told(
         "from = [12, 6], direction = [-1, 0]",
         &[
-            "[history.tip.notch]: the farthest damage along `direction`, at [0.5, 1.5] m, lies on another crack than \
+            "[history.tip.notch]: the farthest damage along `direction`, at [0.5, 0.5] m, lies on another crack than \
              the damage at `from`; give a `set` that contains the points of one crack only",
         ],
     );

@@ -433,10 +433,13 @@ fn contact_that_a_run_does_not_support_is_rejected_without_a_deck() {
     let rough_pair = "contact.pair.own = { bodies = ['plate', 'plate'], static_friction = 0.3, model = 'penalty' }";
     let cases = [
         (refined, "[refinement.trigger]: contact is not available"),
-        (with_method("contact = {}", "static"), "method: \"static\""),
+        (
+            with_method("contact = {}", "static"),
+            "[time] method: \"static\"",
+        ),
         (
             with_method(&ball("stiffness = 3"), "static"),
-            "method: \"static\"",
+            "[time] method: \"static\"",
         ),
         (
             with_method("contact.friction = 0.3", "relaxation"),

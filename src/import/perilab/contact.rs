@@ -85,8 +85,8 @@ fn block<'b>(
     Ok(block)
 }
 
-/// Write the contact radius. Log if two points of the blocks may start so close to each other that their
-/// contact distance is shorter.
+/// Write the contact radius. Add a log note if two points of the blocks may start so close to each other that
+/// Fissure shortens their contact distance.
 fn radius(
     translation: &Translation,
     model: &Node,
@@ -173,7 +173,7 @@ fn perilab_spring(symmetry: &str, horizon: f64) -> f64 {
     }
 }
 
-/// Return the dimension of the new deck; its plane problems have a thickness of 1.
+/// Return the dimension of the new deck. In a plane problem, its thickness is 1.
 fn dimension(setting: &str) -> Dimension {
     match setting {
         "plane-stress" => Dimension::PlaneStress { thickness: 1.0 },

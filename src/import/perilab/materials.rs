@@ -38,8 +38,8 @@ const PRECEDENCE: [&str; 4] = [
 /// Log note for an elastic constant that PeriLab ignores.
 const IGNORED: &str = "PeriLab computes it from the other constants";
 
-/// Constants of an orthotropic solid: name, key in the new deck, and whether thin sheets in plane stress have
-/// the constant.
+/// Constants of an orthotropic solid. Each entry has the name in PeriLab, the key in the new deck, and
+/// whether the new deck has this constant in plane stress.
 const ORTHOTROPIC: [(&str, &str, bool); 9] = [
     ("Young's Modulus X", "youngs_modulus_x", true),
     ("Young's Modulus Y", "youngs_modulus_y", true),
@@ -52,8 +52,9 @@ const ORTHOTROPIC: [(&str, &str, bool); 9] = [
     ("Shear Modulus XZ", "shear_modulus_xz", false),
 ];
 
-/// Constants of a transversely isotropic solid that equal other constants: key of the constant and key of the
-/// other constant, both in the new deck. The isotropic plane is that of y and z.
+/// Pairs of equal constants of a transversely isotropic solid. Each entry has the key of a constant that the
+/// source deck does not give, and the key of the constant with the same value, both in the new deck. The
+/// isotropic plane is that of y and z.
 const TRANSVERSE: [(&str, &str); 3] = [
     ("youngs_modulus_z", "youngs_modulus_y"),
     ("poisson_ratio_xz", "poisson_ratio_xy"),

@@ -110,8 +110,8 @@ pub fn out_of_plane_stress<const D: usize>(
 }
 
 /// Divide C_p⁻¹ by the cube root of its determinant. Plastic flow preserves volume, so the determinant of
-/// each C_p⁻¹ is 1, but the determinant of a mean of different C_p⁻¹ is not. `entries` are those of C_p⁻¹ −
-/// I. They do not change if the determinant is 1 except for round-off.
+/// each C_p⁻¹ is 1. The determinant of a mean of different C_p⁻¹ is generally not 1. `entries` are those of
+/// C_p⁻¹ − I. If the determinant is 1 up to round-off, they do not change.
 pub fn restore_volume(entries: &mut [f64; 6]) {
     let one = Matrix3::identity();
     let inverse = one + tensor_of(entries);

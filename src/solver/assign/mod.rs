@@ -215,8 +215,8 @@ pub fn pair_damage_laws(problem: &Problem, pair: &InterfacePair) -> Option<[Dama
     }))
 }
 
-/// Return the fracture energy (J/m²) of a damage from which critical stretches follow, for a body with these
-/// constants. `None` if the deck gives a critical stretch or a strength instead.
+/// Return the fracture energy (J/m²) from which the critical stretch of this damage follows, for a body with
+/// these constants. `None` if the deck gives a critical stretch or a strength instead.
 fn fracture_energy(problem: &Problem, damage: &problem::Damage, elastic: Isotropic) -> Option<f64> {
     let dimension = problem.dimension;
     let energy = match damage.toughness {
@@ -309,8 +309,8 @@ fn pair_criterion(laws: [DamageLaw; 2], stiffness: [f64; 2]) -> Criterion {
     }
 }
 
-/// Factor that converts a critical stretch of the body of block `from` to an end of bonds in block `to`.
-/// `constants` are the constants of this end. The fracture energy remains the same.
+/// Factor that converts a critical stretch of the body of block `from` to an end of bonds in block `to`, for
+/// the same fracture energy. `constants` are the constants of this end.
 fn stretch_ratio(problem: &Problem, [to, from]: [usize; 2], constants: Constants) -> f64 {
     let [to, from] = [to, from].map(|block| problem.block(block));
     let damage = from.body.damage.as_ref();

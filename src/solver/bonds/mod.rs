@@ -116,9 +116,9 @@ fn strengths<const D: usize>(blocks: &[BlockLaws], model: &Model<D>) -> Vec<f64>
     (0..model.owned()).into_par_iter().map(strength).collect()
 }
 
-/// Threshold of an owned point with this smallest stretch, see
-/// [`DamageLaw::threshold`](crate::damage::DamageLaw::threshold); ∞ for a block without a damage law.
-/// `strengths` are the strengths f of the points.
+/// Threshold of an owned point; ∞ for a block without a damage law. See
+/// [`DamageLaw::threshold`](crate::damage::DamageLaw::threshold). `smallest` is the smallest stretch of the
+/// intact bonds of the point. `strengths` contains the strength f of each point.
 fn threshold<const D: usize>(
     blocks: &[BlockLaws],
     model: &Model<D>,

@@ -1,5 +1,5 @@
-//! Check that loads, supports, temperatures, initial values and conditions of selection are finite at all of
-//! their points.
+//! Check that loads, supports, temperatures, initial values, and the conditions `where` and `only` are finite
+//! at all points where they are evaluated.
 
 use std::ops::Range;
 

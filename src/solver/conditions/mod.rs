@@ -66,9 +66,9 @@ pub enum Work {
     /// In an explicit step: for loads, as [`Self::Trapezoid`]; for supports, the change of the kinetic energy
     /// minus the work of the other forces g: ½ ρ (u̇·u̇ − u̇₀·u̇₀) V − ½ (g₀ + g)·(u − u₀) V.
     ///
-    /// If the velocity of a support jumps, the trapezoidal rule would add part of the kinetic energy one step
-    /// too early or too late, so the energy balance would not close at this time. If the next step had
-    /// another length, the balance would not close afterwards either.
+    /// The trapezoidal rule is not used for supports. If the velocity of a support jumps, the rule would add
+    /// part of the kinetic energy one step too early or too late. The energy balance would then not close at
+    /// this time. If the next step had another length, the balance would not close afterwards either.
     Step,
 }
 

@@ -54,8 +54,8 @@ pub struct Supported {
     before: Vec<f64>,
     /// Displacement before the step, m.
     moved_from: Vec<f64>,
-    /// Velocity (m/s) before the step, and sum of the other force densities on the point (N/m³). Empty if no
-    /// step has used [`Work::Step`].
+    /// Velocity before the step (m/s), and force density without the reaction before the step (N/m³). Empty
+    /// if no step has used [`Work::Step`].
     motion: Vec<[f64; 2]>,
 }
 
@@ -168,7 +168,7 @@ impl Supported {
         }
     }
 
-    /// Store velocities and the forces of all other causes, for [`Work::Step`] of the next step.
+    /// Store the velocities and the force densities without reactions, for [`Work::Step`] of the next step.
     pub fn record_motion<const D: usize>(&mut self, supports: &[Support], part: &Part<'_, D>) {
         let component = supports[self.support].component;
         self.motion.clear();

@@ -9,7 +9,7 @@ pub fn cell_of(position: [f64; 3], edge: f64) -> Cell {
     position.map(|x| (x / edge).floor() as i64)
 }
 
-/// Return the hash of a cell. The ranks and buckets of cells follow from it.
+/// Return the hash of a cell. It determines the rank and the bucket of the cell.
 pub fn hash(cell: Cell) -> u64 {
     cell.into_iter().fold(0_u64, |hash, k| {
         let mixed = (hash ^ k as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);

@@ -11,9 +11,9 @@ pub fn stable_density(eigenvalue: f64) -> f64 {
     0.5 * MARGIN * eigenvalue
 }
 
-/// Fictitious density of each owned point (N/m⁴): an upper bound of the point's stiffness, with which
-/// iterations of Δt = 1 are stable. The density of a point without bonds is infinite. `stiffness` contains
-/// the matrices D of the owned points; see [`super::stable_step`].
+/// Fictitious density of each owned point (N/m⁴), with which iterations of Δt = 1 are stable. It is an upper
+/// bound of the stiffness of the point, and infinite for a point without bonds. `stiffness` contains the
+/// matrices D of the owned points; see [`super::stable_step`].
 pub fn fictitious_density(stiffness: &[Vec<f64>; 6]) -> Vec<f64> {
     let density = |point: usize| {
         let entries = stiffness.each_ref().map(|column| column[point]);

@@ -26,10 +26,10 @@ struct Damaged {
     position: [f64; 3],
 }
 
-/// Find a tip that lies on another crack than the one at `from`. Return the position (m) of the farthest
-/// damaged point along the direction of the tip, if no damaged points connect it to the damaged points at
-/// `from`. Return `None` if they connect it, or if no point at `from` is damaged. The result is the same on
-/// all ranks. Collective.
+/// Find out whether a tip lies on another crack than the one at `from`: whether the farthest damaged point
+/// along the direction of the tip is ahead of all damaged points that are connected to the damaged points at
+/// `from`. If so, return the position (m) of the farthest damaged point. Return `None` otherwise, or if no
+/// point at `from` is damaged. The result is the same on all ranks. Collective.
 pub fn foreign_tip<const D: usize>(
     simulation: &Simulation<'_, D>,
     rule: &problem::Tip,

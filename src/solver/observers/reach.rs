@@ -76,13 +76,12 @@ impl Course {
     ///
     /// The search starts at the farthest point whose value exceeds the threshold. If several of these points
     /// are equally far, the search starts at the point with the smallest id. Only points ahead of this point
-    /// and within the horizon of its body are considered. Among them, the next points are those with the
-    /// smallest distance from the start of the line, measured along the line. Between the farthest point and
-    /// the next points, the values are interpolated linearly. The result is the position at which the
-    /// interpolated value equals the threshold. Without next points, it is the position of the farthest
-    /// point. If several points are equally far along the line, the interpolation uses the largest of their
-    /// values. While values grow, the result therefore moves along the line without jumps, also when the
-    /// value of a next point begins to exceed the threshold.
+    /// and within the horizon of its body are considered. The next points are those of them with the smallest
+    /// coordinate along the line. The values are interpolated linearly between the farthest point and the
+    /// next points. The result is the position at which the interpolated value equals the threshold. Without
+    /// next points, the result is the position of the farthest point. If several points are equally far along
+    /// the line, the interpolation uses their largest value. While values grow, the result therefore moves
+    /// along the line without jumps, also when the value of a next point begins to exceed the threshold.
     pub fn reached<const D: usize>(
         &self,
         simulation: &Simulation<'_, D>,

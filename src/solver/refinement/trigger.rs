@@ -210,9 +210,10 @@ impl<'a, const D: usize> Simulation<'a, D> {
         (0..model.owned()).map(is_trigger).collect()
     }
 
-    /// Collect the marked points among the local points, with their horizons. `marked` has an entry for each
-    /// owned point. A rank has all points within the length of the longest bond from its owned points, so the
-    /// result contains every source whose horizon includes an owned point. Collective.
+    /// Return the marked points among the owned points and ghosts, with their horizons. `marked` has an entry
+    /// for each owned point. The owned points and ghosts of a rank include all points within the length of
+    /// the longest bond from its owned points. The result therefore contains every source whose horizon
+    /// includes an owned point. Collective.
     fn sources(&mut self, marked: &[bool]) -> Vec<Source> {
         let model = &self.model;
         // 0 for points that are not marked.
