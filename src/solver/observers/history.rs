@@ -102,7 +102,7 @@ pub struct HistoryRow {
     /// Value of S in the first row, J. S is the sum of the energies minus the work, see [`Energies::error`].
     pub first_energy: f64,
     /// Upper estimate of the kinetic energy (J) that loads and prescribed motions add in a step, but that is
-    /// not part of the recorded work; see [`Conditions::step_energy`].
+    /// not part of the recorded work; see `Conditions::step_energy`.
     pub step_energy: f64,
     /// Number of bonds broken since the start.
     pub broken: u64,
