@@ -24,8 +24,8 @@
 
 use super::bond::Weights;
 use super::{
-    Along, AnyLaw, Bond, Built, Declaration, Declared, Described, DirectionalOrdinary, Given,
-    Influence, Key, Kind, Law, Pals, PlasticState, Property, Word,
+    Along, AnyLaw, Bond, Built, Declaration, Declared, Described, Given, Influence, Key, Kind, Law,
+    PlasticState, PositionAware, Property, Word,
 };
 use crate::damage::CriticalStretch;
 use crate::dimension::Dimension;
@@ -188,8 +188,7 @@ impl Declared for Ordinary {
 fn build(given: &Given) -> Built {
     match given.values.word(SURFACE_CORRECTION.name) {
         "none" => with_influence(Ordinary::of(given, influence(given)), given),
-        "pals" => with_influence(Pals::of(given, influence(given)), given),
-        _ => with_influence(DirectionalOrdinary::of(given, influence(given)), given),
+        _ => with_influence(PositionAware::of(given, influence(given)), given),
     }
 }
 

@@ -29,9 +29,8 @@
 
 use super::ordinary::{Ordinary, SURFACE_CORRECTION, inelastic_force_state};
 use super::{
-    Along, Bond, Built, Declaration, Declared, Described, DirectionalOrdinary, DirectionalPlastic,
-    Given, Influence, Invariants, Key, Kind, Law, LawFault, Pals, PalsPlastic, PlasticState,
-    Property, Values, Word,
+    Along, Bond, Built, Declaration, Declared, Described, Given, Influence, Invariants, Key, Kind,
+    Law, LawFault, PlasticState, PositionAware, PositionAwarePlastic, Property, Values, Word,
 };
 use crate::dimension::Dimension;
 use crate::lanes::{IsaSet, Lanes};
@@ -91,13 +90,9 @@ fn build(given: &Given) -> Built {
     let shear = given.elastic.shear_modulus();
     match given.values.word(SURFACE_CORRECTION.name) {
         "none" => without_correction(given, stress),
-        "pals" => {
-            let elastic = Pals::of(given, Influence::Constant);
-            Built::plain(PalsPlastic::new(elastic, stress, shear))
-        }
         _ => {
-            let elastic = DirectionalOrdinary::of(given, Influence::Constant);
-            Built::plain(DirectionalPlastic::new(elastic, stress, shear))
+            let elastic = PositionAware::of(given, Influence::Constant);
+            Built::plain(PositionAwarePlastic::new(elastic, stress, shear))
         }
     }
 }

@@ -19,9 +19,8 @@ use super::ordinary::{
     INFLUENCE, Ordinary, SURFACE_CORRECTION, inelastic_force_state, influence, with_influence,
 };
 use super::{
-    Along, Bond, Built, Declaration, Declared, Described, DirectionalOrdinary,
-    DirectionalViscoelastic, Given, Invariants, Key, Kind, Law, Pals, PalsViscoelastic,
-    PlasticState, Property,
+    Along, Bond, Built, Declaration, Declared, Described, Given, Invariants, Key, Kind, Law,
+    PlasticState, PositionAware, PositionAwareViscoelastic, Property,
 };
 use crate::lanes::{IsaSet, Lanes};
 
@@ -92,13 +91,9 @@ fn build(given: &Given) -> Built {
             };
             with_influence(law, given)
         }
-        "pals" => {
-            let elastic = Pals::of(given, influence);
-            with_influence(PalsViscoelastic::new(elastic, relaxation), given)
-        }
         _ => {
-            let elastic = DirectionalOrdinary::of(given, influence);
-            with_influence(DirectionalViscoelastic::new(elastic, relaxation), given)
+            let elastic = PositionAware::of(given, influence);
+            with_influence(PositionAwareViscoelastic::new(elastic, relaxation), given)
         }
     }
 }

@@ -11,8 +11,8 @@ use std::f64::consts::PI;
 use super::bond::Weights;
 use super::declaration::bond_based_critical_stretch;
 use super::{
-    Along, Bond, Built, Declaration, Declared, Described, DirectionalPmb, Given, Key, Kind, Law,
-    Normalised, Property, TensorPmb, Word,
+    Along, Bond, Built, Declaration, Declared, Described, Given, Key, Kind, Law, Normalised,
+    Property, SurfacePmb, Word,
 };
 use crate::dimension::{Constraint, Dimension};
 use crate::lanes::{Lanes, Simd};
@@ -77,7 +77,7 @@ impl Pmb {
     }
 }
 
-const SURFACE_CORRECTION: Key = Key {
+pub(super) const SURFACE_CORRECTION: Key = Key {
     name: "surface_correction",
     meaning: "surface correction of the micromodulus of each point, from its own family: none, \
               by strain energy, by strain energies along the axes, or by elastic tensor",
@@ -117,8 +117,7 @@ fn build(given: &Given) -> Built {
         // In 1-D all bonds have the same direction. The other corrections would then equal `energy`, except
         // for their limits.
         _ if given.dimension.count() == 1 => Built::plain(Normalised::classical(given)),
-        "tensor" => Built::plain(TensorPmb::of(given)),
-        _ => Built::plain(DirectionalPmb::of(given)),
+        _ => Built::plain(SurfacePmb::of(given)),
     }
 }
 

@@ -5,42 +5,23 @@
 //! deviatoric energies at the same strain: the energy of the solid, divided by the energy of the family with
 //! σ₀.
 
+use super::Fit;
 use super::conditions::{Conditions, of_product, one_in_directions, product, weighted_volume};
-use super::{Fit, Form};
-use crate::lanes::Lanes;
-use crate::material::symmetric::Symmetric;
-use crate::material::{Bond, ellipsoid};
+use crate::material::ellipsoid;
 
-/// `surface_correction = "directional"`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Directional;
-
-impl Form for Directional {
-    const WITHOUT_BONDS: f64 = ellipsoid::WITHOUT_BONDS;
-
-    /// Return the tensors of the ellipsoids.
-    fn fit<const D: usize>(
-        [of_directions, of_squares]: [&[f64]; 2],
-        [dilatational, deviatoric]: [&Conditions<D>; 2],
-        reference: f64,
-    ) -> Fit<D> {
-        let omega = semi_axes(dilatational, of_directions);
-        let sigma = semi_axes(deviatoric, of_squares);
-        Fit {
-            omega: ellipsoid::tensor(omega, dilatational.constant),
-            sigma: ellipsoid::tensor(sigma, reference),
-            products: bounds(of_directions, [omega, sigma], reference),
-        }
-    }
-
-    #[inline(always)]
-    fn dilatational<const D: usize>(bond: &Bond<D>, tensor: &Symmetric<D>) -> Lanes {
-        ellipsoid::radius(bond, tensor)
-    }
-
-    #[inline(always)]
-    fn deviatoric<const D: usize>(bond: &Bond<D>, tensor: &Symmetric<D>) -> Lanes {
-        ellipsoid::radius(bond, tensor)
+/// Return the tensors of the ellipsoids, and the arguments R, Q and τ of [`super::largest_ratio`]. The arguments
+/// are those of [`super::Form::fit`].
+pub fn fit<const D: usize>(
+    [of_directions, of_squares]: [&[f64]; 2],
+    [dilatational, deviatoric]: [&Conditions<D>; 2],
+    reference: f64,
+) -> Fit<D> {
+    let omega = semi_axes(dilatational, of_directions);
+    let sigma = semi_axes(deviatoric, of_squares);
+    Fit {
+        omega: ellipsoid::tensor(omega, dilatational.constant),
+        sigma: ellipsoid::tensor(sigma, reference),
+        products: bounds(of_directions, [omega, sigma], reference),
     }
 }
 

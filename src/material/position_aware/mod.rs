@@ -32,24 +32,20 @@ mod nearest;
 mod plastic;
 mod viscoelastic;
 
-pub use plastic::{DirectionalPlastic, PalsPlastic};
-pub use viscoelastic::{DirectionalViscoelastic, PalsViscoelastic};
-
-use std::fmt::Debug;
-use std::marker::PhantomData;
+pub use plastic::PositionAwarePlastic;
+pub use viscoelastic::PositionAwareViscoelastic;
 
 use nalgebra::SMatrix;
 
 use super::monomials::write_monomials;
-use super::ordinary::Ordinary;
-use super::symmetric::{Symmetric, to_entries};
+use super::ordinary::{Ordinary, SURFACE_CORRECTION};
+use super::symmetric::{Symmetric, quadratic_form, quadratic_form_of, to_entries};
 use super::{
     Along, Bond, Declaration, Declared, Described, Given, Influence, Law, PlasticState, Property,
+    ellipsoid,
 };
 use crate::lanes::Lanes;
 use conditions::{Conditions, weighted_volume};
-use directional::Directional;
-use nearest::Nearest;
 
 /// Number of monomials of degree 4 in three variables.
 const MONOMIALS: usize = 15;
@@ -67,51 +63,82 @@ pub struct Fit<const D: usize> {
     products: [f64; 3],
 }
 
-/// Form of the functions ω and σ.
-pub trait Form: Debug + Clone + Copy + PartialEq + Send + Sync {
-    /// Diagonal entries of the tensors of ω and σ, for a point that has no bonds within its own horizon.
-    /// These entries make ω and σ nearly 0.
-    const WITHOUT_BONDS: f64;
+/// Form of the functions ω and σ. The form is chosen at run time, because a copy of all loops for each form
+/// would hardly be faster.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Form {
+    /// The functions of [`nearest`]; `surface_correction = "pals"`.
+    Nearest,
+    /// The functions of [`directional`]; `surface_correction = "directional"`.
+    Directional,
+}
+
+impl Form {
+    /// Return the diagonal entries of the tensors of ω and σ, for a point that has no bonds within its own
+    /// horizon. These entries make ω and σ nearly 0.
+    fn without_bonds(self) -> f64 {
+        match self {
+            Self::Nearest => 0.0,
+            Self::Directional => ellipsoid::WITHOUT_BONDS,
+        }
+    }
 
     /// Fit ω to `conditions[0]` and σ to `conditions[1]`. `sums[0]` are the sums of |ξ|² Ṽ times the
     /// monomials of degree 4 in the components of the bond direction n. `sums[1]` are the same sums with N
     /// instead of n, where N_a = n_a². `reference` is σ₀, N/m⁷.
     fn fit<const D: usize>(
+        self,
         sums: [&[f64]; 2],
         conditions: [&Conditions<D>; 2],
         reference: f64,
-    ) -> Fit<D>;
+    ) -> Fit<D> {
+        match self {
+            Self::Nearest => nearest::fit(sums, conditions, reference),
+            Self::Directional => directional::fit(sums, conditions, reference),
+        }
+    }
 
     /// Return ω of eight bonds, 1/m⁵.
-    fn dilatational<const D: usize>(bond: &Bond<D>, tensor: &Symmetric<D>) -> Lanes;
+    #[inline(always)]
+    fn dilatational<const D: usize>(self, bond: &Bond<D>, tensor: &Symmetric<D>) -> Lanes {
+        match self {
+            Self::Nearest => quadratic_form(bond, tensor),
+            Self::Directional => ellipsoid::radius(bond, tensor),
+        }
+    }
 
     /// Return σ of eight bonds, N/m⁷.
-    fn deviatoric<const D: usize>(bond: &Bond<D>, tensor: &Symmetric<D>) -> Lanes;
+    #[inline(always)]
+    fn deviatoric<const D: usize>(self, bond: &Bond<D>, tensor: &Symmetric<D>) -> Lanes {
+        match self {
+            Self::Nearest => quadratic_form_of(&squares(bond), tensor),
+            Self::Directional => ellipsoid::radius(bond, tensor),
+        }
+    }
 }
-
-/// The law with `surface_correction = "pals"`.
-pub type Pals = PositionAware<Nearest>;
-
-/// The law with `surface_correction = "directional"`.
-pub type DirectionalOrdinary = PositionAware<Directional>;
 
 /// The constants of the law.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PositionAware<F> {
+pub struct PositionAware {
     /// The linear solid with ω = ω₀ and σ = σ₀.
     ordinary: Ordinary,
     /// Whether the critical stretch follows from a fracture energy, and is therefore scaled with σ.
     is_scaled: bool,
-    form: PhantomData<F>,
+    form: Form,
 }
 
-impl<F: Form> PositionAware<F> {
-    /// Create the law of a 2-D or 3-D body, with the given influence function.
+impl PositionAware {
+    /// Create the law of a 2-D or 3-D body with a surface correction and the given influence function.
     pub(super) fn of(given: &Given, influence: Influence) -> Self {
+        let is_nearest = given.values.word(SURFACE_CORRECTION.name) == "pals";
         Self {
             ordinary: Ordinary::of(given, influence),
             is_scaled: given.from_fracture_energy,
-            form: PhantomData,
+            form: if is_nearest {
+                Form::Nearest
+            } else {
+                Form::Directional
+            },
         }
     }
 
@@ -142,11 +169,11 @@ impl<F: Form> PositionAware<F> {
 }
 
 /// The law has no name of its own in decks. Decks select it with `ordinary` and a `surface_correction`.
-impl<F: Form> Declared for PositionAware<F> {
+impl Declared for PositionAware {
     const DECLARATIONS: &'static [Declaration] = &[];
 }
 
-impl<F: Form> Described for PositionAware<F> {
+impl Described for PositionAware {
     fn described(&self) -> Vec<(&'static str, Property)> {
         let value = "ordinary state-based, with the influence functions of each point's own family";
         vec![("forces", Property::Text(value))]
@@ -185,7 +212,7 @@ fn squares<const D: usize>(bond: &Bond<D>) -> [Lanes; D] {
     squares
 }
 
-impl<F: Form, const D: usize> Law<D> for PositionAware<F> {
+impl<const D: usize> Law<D> for PositionAware {
     /// Constants: the tensors of ω and σ, and a number λ with W ≤ ½ λ Σ σ e² Ṽ. Numbers that are
     /// recomputed before each force evaluation: k′θ − (1/d) Σ σ|ξ| ε Ṽ (Pa) and θ/d.
     type Point = (Functions<D>, [Lanes; OTHERS + 2]);
@@ -220,7 +247,7 @@ impl<F: Form, const D: usize> Law<D> for PositionAware<F> {
         let weighted_volume = weighted_volume::<D>(of_directions);
         // True for a point without bonds.
         if weighted_volume <= 0.0 {
-            let nothing = SMatrix::<f64, D, D>::identity() * F::WITHOUT_BONDS;
+            let nothing = SMatrix::<f64, D, D>::identity() * self.form.without_bonds();
             to_entries(&nothing, numbers);
             to_entries(&nothing, &mut numbers[2 * D..]);
             return;
@@ -230,7 +257,9 @@ impl<F: Form, const D: usize> Law<D> for PositionAware<F> {
             &Conditions::dilatational(weighted_volume),
             &Conditions::deviatoric(weighted_volume),
         ];
-        let fit = F::fit::<D>([of_directions, of_squares], conditions, reference);
+        let fit = self
+            .form
+            .fit::<D>([of_directions, of_squares], conditions, reference);
         to_entries(&fit.omega, numbers);
         to_entries(&fit.sigma, &mut numbers[2 * D..]);
         numbers[4 * D] = largest_ratio(self.bulk_modulus(), D as f64, fit.products);
@@ -245,9 +274,9 @@ impl<F: Form, const D: usize> Law<D> for PositionAware<F> {
     ) -> [Lanes; 3] {
         let square = bond.length * bond.length;
         let extension = square * bond.stretch;
-        let sigma = F::deviatoric(bond, &functions.1);
+        let sigma = self.form.deviatoric(bond, &functions.1);
         [
-            F::dilatational(bond, &functions.0) * extension,
+            self.form.dilatational(bond, &functions.0) * extension,
             sigma * extension,
             sigma * square,
         ]
@@ -275,9 +304,9 @@ impl<F: Form, const D: usize> Law<D> for PositionAware<F> {
         _: &[Lanes; 0],
     ) -> Along {
         let shortening = Lanes::splat(1.0) - bond.extension_over_deformed;
-        let deviatoric =
-            F::deviatoric(bond, &functions.1) * (bond.extension_over_deformed - *mean * shortening);
-        Along(F::dilatational(bond, &functions.0) * (*pressure * shortening) + deviatoric)
+        let deviatoric = self.form.deviatoric(bond, &functions.1)
+            * (bond.extension_over_deformed - *mean * shortening);
+        Along(self.form.dilatational(bond, &functions.0) * (*pressure * shortening) + deviatoric)
     }
 
     #[inline(always)]
@@ -288,7 +317,7 @@ impl<F: Form, const D: usize> Law<D> for PositionAware<F> {
         _: &[Lanes; 0],
     ) -> Lanes {
         let extension = bond.length * (bond.stretch - *mean);
-        extension * extension * F::deviatoric(bond, &functions.1) * 0.5
+        extension * extension * self.form.deviatoric(bond, &functions.1) * 0.5
     }
 
     fn point_energy(&self, numbers: &[f64]) -> f64 {
@@ -306,7 +335,7 @@ impl<F: Form, const D: usize> Law<D> for PositionAware<F> {
 
     #[inline(always)]
     fn stiffness(&self, bond: &Bond<D>, (functions, [ratio, ..]): &Self::Point) -> Lanes {
-        F::deviatoric(bond, &functions.1) * *ratio
+        self.form.deviatoric(bond, &functions.1) * *ratio
     }
 
     #[inline(always)]
@@ -319,7 +348,7 @@ impl<F: Form, const D: usize> Law<D> for PositionAware<F> {
         if !self.is_scaled || !other.is_scaled {
             return Lanes::splat(1.0);
         }
-        let both = F::deviatoric(bond, &here.1) + F::deviatoric(bond, &there.1);
+        let both = self.form.deviatoric(bond, &here.1) + other.form.deviatoric(bond, &there.1);
         (Lanes::splat(self.untruncated_sigma() + other.untruncated_sigma()) / both).sqrt()
     }
 }
@@ -358,7 +387,7 @@ mod tests {
         sums
     }
 
-    fn law<F: Form>() -> PositionAware<F> {
+    fn law(form: Form) -> PositionAware {
         let elastic = crate::elastic::Isotropic {
             youngs_modulus: 5.0,
             poisson_ratio: 0.4,
@@ -367,7 +396,7 @@ mod tests {
             ordinary: Ordinary::new(crate::dimension::Dimension::Space, elastic, 600.0)
                 .expect("a law in space"),
             is_scaled: false,
-            form: PhantomData,
+            form,
         }
     }
 
@@ -389,24 +418,29 @@ mod tests {
     }
 
     /// Return ω and σ of all bonds of a point with the family `family`, and λ of this point.
-    fn functions<F: Form>(family: &[Vector3<f64>]) -> (Vec<[f64; 2]>, f64) {
-        functions_of::<F>(family, family)
+    fn functions(form: Form, family: &[Vector3<f64>]) -> (Vec<[f64; 2]>, f64) {
+        functions_of(form, family, family)
     }
 
     /// Return ω and σ of `bonds` at a point with the family `family`, and λ of this point.
-    fn functions_of<F: Form>(
+    fn functions_of(
+        form: Form,
         family: &[Vector3<f64>],
         bonds: &[Vector3<f64>],
     ) -> (Vec<[f64; 2]>, f64) {
         let mut numbers = [0.0; 16];
-        Law::<3>::constants(&law::<F>(), &sums(family), &mut numbers);
+        Law::<3>::constants(&law(form), &sums(family), &mut numbers);
         let [omega, sigma] = [0, 6].map(|first| -> Symmetric<3> {
             let entry = |k: usize| Lanes::splat(numbers[first + k]);
             ([0, 1, 2].map(entry), [3, 4, 5].map(entry))
         });
         let of_bond = |xi: &Vector3<f64>| {
             let bond = bond(xi);
-            [F::dilatational(&bond, &omega), F::deviatoric(&bond, &sigma)].map(|lanes| lanes.0[0])
+            [
+                form.dilatational(&bond, &omega),
+                form.deviatoric(&bond, &sigma),
+            ]
+            .map(|lanes| lanes.0[0])
         };
         (bonds.iter().map(of_bond).collect(), numbers[12])
     }
@@ -425,7 +459,7 @@ mod tests {
                 family(|[x, y, _]| (0..3).contains(&x) && (-1..2).contains(&y)),
             ),
         ] {
-            let (functions, _) = functions::<Nearest>(&family);
+            let (functions, _) = functions(Form::Nearest, &family);
             let mut least = f64::INFINITY;
             for probe in 0..6 {
                 let mut strain = Matrix3::zeros();
@@ -464,10 +498,10 @@ mod tests {
     #[test]
     fn points_without_bonds_have_no_share() {
         for functions in [
-            functions_of::<Nearest>(&[], &family(|_| true)),
-            functions_of::<Directional>(&[], &family(|_| true)),
+            functions_of(Form::Nearest, &[], &family(|_| true)),
+            functions_of(Form::Directional, &[], &family(|_| true)),
         ] {
-            let of_ordinary = law::<Nearest>().untruncated_sigma();
+            let of_ordinary = law(Form::Nearest).untruncated_sigma();
             for [omega, sigma] in functions.0 {
                 assert!((0.0..1e-100).contains(&omega), "{omega}");
                 assert!((0.0..1e-100 * of_ordinary).contains(&sigma), "{sigma}");
@@ -477,9 +511,9 @@ mod tests {
 
     /// Check the upper bound λ. It must be at least the largest eigenvalue of the energy, and at most `most`
     /// times this eigenvalue.
-    fn check_bound<F: Form>(name: &str, family: &[Vector3<f64>], most: f64) {
-        let law = law::<F>();
-        let (functions, bound) = functions::<F>(family);
+    fn check_bound(form: Form, name: &str, family: &[Vector3<f64>], most: f64) {
+        let law = law(form);
+        let (functions, bound) = functions(form, family);
         // Matrix A of 2W = e·A e, with the vector e of all extensions.
         let count = family.len();
         let mut matrix = DMatrix::zeros(count, count);
@@ -521,8 +555,8 @@ mod tests {
             ),
             ("sheet", family(|[.., z]| z == 0), 1.7, 1.5),
         ] {
-            check_bound::<Nearest>(name, &family, pals);
-            check_bound::<Directional>(name, &family, directional);
+            check_bound(Form::Nearest, name, &family, pals);
+            check_bound(Form::Directional, name, &family, directional);
         }
     }
 }

@@ -7,12 +7,10 @@
 
 use nalgebra::{DMatrix, DVector, SMatrix};
 
+use super::Fit;
 use super::conditions::{Conditions, Quadratic, of_product, one_in_squares, product};
-use super::{Fit, Form, squares};
-use crate::lanes::Lanes;
-use crate::material::Bond;
 use crate::material::monomials::{least_squares, multiplicity};
-use crate::material::symmetric::{Symmetric, mixed, quadratic_form, quadratic_form_of};
+use crate::material::symmetric::mixed;
 
 /// Smallest allowed σ/σ₀; stretched bonds with σ < 0 would repel. For a horizon of 3 spacings, the smallest
 /// σ/σ₀ at a corner of a cuboid is about 0.4.
@@ -29,39 +27,22 @@ const LARGEST: f64 = 30.0;
 /// of a cuboid, 0.007 in a sheet of two layers, and 0 in a single layer.
 const RANK: f64 = 5e-3;
 
-/// `surface_correction = "pals"`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Nearest;
-
-impl Form for Nearest {
-    const WITHOUT_BONDS: f64 = 0.0;
-
-    /// Return the tensors Λ of ω and S of σ, and the arguments R, Q and τ of `largest_ratio`.
-    fn fit<const D: usize>(
-        [of_directions, of_squares]: [&[f64]; 2],
-        [dilatational, deviatoric]: [&Conditions<D>; 2],
-        reference: f64,
-    ) -> Fit<D> {
-        let omega = nearest(dilatational, of_directions);
-        let relative = limited(nearest(deviatoric, of_squares).tensor);
-        let [least, _] = extremes(&relative);
-        let sigma = relative * reference;
-        let square = sigma_weighted_volume(of_squares, &sigma);
-        Fit {
-            omega: omega.tensor,
-            sigma,
-            products: [omega.square / (least * reference), square, omega.sum],
-        }
-    }
-
-    #[inline(always)]
-    fn dilatational<const D: usize>(bond: &Bond<D>, tensor: &Symmetric<D>) -> Lanes {
-        quadratic_form(bond, tensor)
-    }
-
-    #[inline(always)]
-    fn deviatoric<const D: usize>(bond: &Bond<D>, tensor: &Symmetric<D>) -> Lanes {
-        quadratic_form_of(&squares(bond), tensor)
+/// Return the tensors Λ of ω and S of σ, and the arguments R, Q and τ of [`super::largest_ratio`]. The
+/// arguments are those of [`super::Form::fit`].
+pub fn fit<const D: usize>(
+    [of_directions, of_squares]: [&[f64]; 2],
+    [dilatational, deviatoric]: [&Conditions<D>; 2],
+    reference: f64,
+) -> Fit<D> {
+    let omega = nearest(dilatational, of_directions);
+    let relative = limited(nearest(deviatoric, of_squares).tensor);
+    let [least, _] = extremes(&relative);
+    let sigma = relative * reference;
+    let square = sigma_weighted_volume(of_squares, &sigma);
+    Fit {
+        omega: omega.tensor,
+        sigma,
+        products: [omega.square / (least * reference), square, omega.sum],
     }
 }
 

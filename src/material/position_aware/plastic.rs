@@ -18,32 +18,24 @@
 //! minimum at 1 − r = Σ σ ε ε_d Ṽ/Σ σ ε_d² Ṽ, with ε and ε_d before the flow. A larger 1 − r would add
 //! energy, so 1 − r is limited to this value.
 
-use super::directional::Directional;
-use super::nearest::Nearest;
 use super::{
-    Along, Bond, Declaration, Declared, Described, Form, Functions, Law, MONOMIALS, OTHERS,
-    PlasticState, PositionAware, Property,
+    Along, Bond, Declaration, Declared, Described, Functions, Law, MONOMIALS, OTHERS, PlasticState,
+    PositionAware, Property,
 };
 use crate::lanes::{IsaSet, Lanes};
 
-/// The law with `surface_correction = "pals"`.
-pub type PalsPlastic = PositionAwarePlastic<Nearest>;
-
-/// The law with `surface_correction = "directional"`.
-pub type DirectionalPlastic = PositionAwarePlastic<Directional>;
-
 /// The constants of the law.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PositionAwarePlastic<F> {
-    elastic: PositionAware<F>,
+pub struct PositionAwarePlastic {
+    elastic: PositionAware,
     /// σ_y²/(3G), Pa.
     limit: f64,
 }
 
-impl<F: Form> PositionAwarePlastic<F> {
+impl PositionAwarePlastic {
     /// Create the law from its elastic law, the yield stress (Pa) and the shear modulus (Pa).
     pub(in super::super) fn new(
-        elastic: PositionAware<F>,
+        elastic: PositionAware,
         yield_stress: f64,
         shear_modulus: f64,
     ) -> Self {
@@ -56,11 +48,11 @@ impl<F: Form> PositionAwarePlastic<F> {
 
 /// The law has no name of its own in decks. Decks select it with `ordinary_plastic` and a
 /// `surface_correction`.
-impl<F: Form> Declared for PositionAwarePlastic<F> {
+impl Declared for PositionAwarePlastic {
     const DECLARATIONS: &'static [Declaration] = &[];
 }
 
-impl<F: Form> Described for PositionAwarePlastic<F> {
+impl Described for PositionAwarePlastic {
     fn described(&self) -> Vec<(&'static str, Property)> {
         let mut facts = self.elastic.described();
         facts.push(("yields", Property::Text("by each point's own family")));
@@ -76,7 +68,7 @@ fn elastic<const D: usize>(bond: &Bond<D>, plastic: Lanes) -> Bond<D> {
     bond
 }
 
-impl<F: Form, const D: usize> Law<D> for PositionAwarePlastic<F> {
+impl<const D: usize> Law<D> for PositionAwarePlastic {
     /// The numbers of [`PositionAware`], then the mean elastic stretch Σ ω|ξ| (e − e_p) Ṽ/Σ ω|ξ|² Ṽ, and
     /// 1 − r.
     type Point = (Functions<D>, [Lanes; OTHERS + 4]);
@@ -117,12 +109,12 @@ impl<F: Form, const D: usize> Law<D> for PositionAwarePlastic<F> {
         let nothing = Lanes::splat(0.0);
         match S {
             0 => {
-                let weight = F::dilatational(&bond, &functions.0) * square;
+                let weight = self.elastic.form.dilatational(&bond, &functions.0) * square;
                 [weight * bond.stretch, weight, nothing]
             }
             1 => {
                 let part = bond.stretch - *mean;
-                let weighted = F::deviatoric(&bond, &functions.1) * square * part;
+                let weighted = self.elastic.form.deviatoric(&bond, &functions.1) * square * part;
                 [weighted * part, weighted, nothing]
             }
             _ => {
@@ -176,7 +168,7 @@ impl<F: Form, const D: usize> Law<D> for PositionAwarePlastic<F> {
     ) -> [Lanes; 2] {
         let stretch = bond.stretch - *plastic;
         let change = (stretch - *mean) * *plastic_fraction;
-        let factor = F::deviatoric(bond, &functions.1) * (bond.length * bond.length);
+        let factor = self.elastic.form.deviatoric(bond, &functions.1) * (bond.length * bond.length);
         let dissipated = factor * (stretch - *isotropic_stretch - change) * change;
         [*plastic + change, *loss + dissipated]
     }
@@ -228,6 +220,6 @@ impl<F: Form, const D: usize> Law<D> for PositionAwarePlastic<F> {
 
     #[inline(always)]
     fn stiffness(&self, bond: &Bond<D>, (functions, [ratio, ..]): &Self::Point) -> Lanes {
-        F::deviatoric(bond, &functions.1) * *ratio
+        self.elastic.form.deviatoric(bond, &functions.1) * *ratio
     }
 }

@@ -9,30 +9,22 @@
 //! t = (k′θ − (1/d) Σ σ|ξ| (ε − λ e_b) Ṽ) ω|ξ| + σ (ε − λ e_b).
 
 use super::super::ordinary_viscoelastic::Relaxation;
-use super::directional::Directional;
-use super::nearest::Nearest;
 use super::{
-    Along, Bond, Declaration, Declared, Described, Form, Functions, Law, MONOMIALS, OTHERS,
-    PlasticState, PositionAware, Property,
+    Along, Bond, Declaration, Declared, Described, Functions, Law, MONOMIALS, OTHERS, PlasticState,
+    PositionAware, Property,
 };
 use crate::lanes::{IsaSet, Lanes};
 
-/// The law with `surface_correction = "pals"`.
-pub type PalsViscoelastic = PositionAwareViscoelastic<Nearest>;
-
-/// The law with `surface_correction = "directional"`.
-pub type DirectionalViscoelastic = PositionAwareViscoelastic<Directional>;
-
 /// The constants of the law.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PositionAwareViscoelastic<F> {
-    elastic: PositionAware<F>,
+pub struct PositionAwareViscoelastic {
+    elastic: PositionAware,
     relaxation: Relaxation,
 }
 
-impl<F: Form> PositionAwareViscoelastic<F> {
+impl PositionAwareViscoelastic {
     /// Create the law from its elastic law and its relaxation.
-    pub(in super::super) fn new(elastic: PositionAware<F>, relaxation: Relaxation) -> Self {
+    pub(in super::super) fn new(elastic: PositionAware, relaxation: Relaxation) -> Self {
         Self {
             elastic,
             relaxation,
@@ -42,11 +34,11 @@ impl<F: Form> PositionAwareViscoelastic<F> {
 
 /// The law has no name of its own in decks. Decks select it with `ordinary_viscoelastic` and a
 /// `surface_correction`.
-impl<F: Form> Declared for PositionAwareViscoelastic<F> {
+impl Declared for PositionAwareViscoelastic {
     const DECLARATIONS: &'static [Declaration] = &[];
 }
 
-impl<F: Form> Described for PositionAwareViscoelastic<F> {
+impl Described for PositionAwareViscoelastic {
     fn described(&self) -> Vec<(&'static str, Property)> {
         let mut facts = self.elastic.described();
         facts.extend(self.relaxation.described());
@@ -54,7 +46,7 @@ impl<F: Form> Described for PositionAwareViscoelastic<F> {
     }
 }
 
-impl<F: Form, const D: usize> Law<D> for PositionAwareViscoelastic<F> {
+impl<const D: usize> Law<D> for PositionAwareViscoelastic {
     /// The numbers of [`PositionAware`], but k′θ − (1/d) Σ σ|ξ| (ε − λ e_b) Ṽ (Pa) replaces
     /// k′θ − (1/d) Σ σ|ξ| ε Ṽ.
     type Point = (Functions<D>, [Lanes; OTHERS + 2]);
@@ -93,7 +85,7 @@ impl<F: Form, const D: usize> Law<D> for PositionAwareViscoelastic<F> {
         if S == 0 {
             return self.elastic.pass_contribution::<0>(bond, point, &[]);
         }
-        let factor = F::deviatoric(bond, &point.0.1) * (bond.length * bond.length);
+        let factor = self.elastic.form.deviatoric(bond, &point.0.1) * (bond.length * bond.length);
         let nothing = Lanes::splat(0.0);
         [factor * *back, nothing, nothing]
     }
@@ -127,7 +119,7 @@ impl<F: Form, const D: usize> Law<D> for PositionAwareViscoelastic<F> {
         history: &[Lanes; 3],
         step: f64,
     ) -> [Lanes; 3] {
-        let factor = F::deviatoric(bond, &functions.1) * (bond.length * bond.length);
+        let factor = self.elastic.form.deviatoric(bond, &functions.1) * (bond.length * bond.length);
         (self.relaxation).after(bond.stretch - *isotropic_stretch, history, factor, step)
     }
 
@@ -155,7 +147,10 @@ impl<F: Form, const D: usize> Law<D> for PositionAwareViscoelastic<F> {
     ) -> Lanes {
         let part = bond.stretch - *isotropic_stretch;
         let square = part * part + self.relaxation.change_of_square(part, *back);
-        square * (bond.length * bond.length) * F::deviatoric(bond, &functions.1) * 0.5
+        square
+            * (bond.length * bond.length)
+            * self.elastic.form.deviatoric(bond, &functions.1)
+            * 0.5
     }
 
     fn point_energy(&self, numbers: &[f64]) -> f64 {
@@ -177,7 +172,7 @@ impl<F: Form, const D: usize> Law<D> for PositionAwareViscoelastic<F> {
 
     #[inline(always)]
     fn stiffness(&self, bond: &Bond<D>, (functions, [ratio, ..]): &Self::Point) -> Lanes {
-        F::deviatoric(bond, &functions.1) * *ratio
+        self.elastic.form.deviatoric(bond, &functions.1) * *ratio
     }
 
     #[inline(always)]

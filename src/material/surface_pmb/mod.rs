@@ -21,40 +21,50 @@
 mod directional;
 mod tensor;
 
-use std::fmt::Debug;
-use std::marker::PhantomData;
-
 use nalgebra::SMatrix;
 
 use super::monomials::write_monomials;
-use super::symmetric::{Symmetric, to_entries};
-use super::{Along, Bond, Declaration, Declared, Described, Given, Law, Pmb, Property};
+use super::pmb::SURFACE_CORRECTION;
+use super::symmetric::{Symmetric, quadratic_form, to_entries};
+use super::{Along, Bond, Declaration, Declared, Described, Given, Law, Pmb, Property, ellipsoid};
 use crate::lanes::Lanes;
-use directional::Directional;
-use tensor::Tensor;
 
 /// Number of monomials of degree 6 in three variables.
 const MONOMIALS: usize = 28;
 
-/// Form of the function h.
-pub trait Form: Debug + Clone + Copy + PartialEq + Send + Sync {
-    /// Return the tensor that determines ½ h of a point. `sums` are the sums of |ξ| Ṽ c/μ times the monomials
-    /// of degree 6 of n.
-    fn fit<const D: usize>(sums: &[f64]) -> SMatrix<f64, D, D>;
-
-    /// Return ½ h of eight bonds.
-    fn half<const D: usize>(bond: &Bond<D>, tensor: &Symmetric<D>) -> Lanes;
+/// Form of the function h. The form is chosen at run time, because a copy of all loops for each form would
+/// hardly be faster.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Form {
+    /// The function of [`tensor`]; `surface_correction = "tensor"`.
+    Tensor,
+    /// The function of [`directional`]; `surface_correction = "directional"`.
+    Directional,
 }
 
-/// The law with `surface_correction = "tensor"`.
-pub type TensorPmb = SurfacePmb<Tensor>;
+impl Form {
+    /// Return the tensor that determines ½ h of a point. `sums` are the sums of |ξ| Ṽ c/μ times the monomials
+    /// of degree 6 of n.
+    fn fit<const D: usize>(self, sums: &[f64]) -> SMatrix<f64, D, D> {
+        match self {
+            Self::Tensor => tensor::fit(sums),
+            Self::Directional => directional::fit(sums),
+        }
+    }
 
-/// The law with `surface_correction = "directional"`.
-pub type DirectionalPmb = SurfacePmb<Directional>;
+    /// Return ½ h of eight bonds.
+    #[inline(always)]
+    fn half<const D: usize>(self, bond: &Bond<D>, tensor: &Symmetric<D>) -> Lanes {
+        match self {
+            Self::Tensor => quadratic_form(bond, tensor),
+            Self::Directional => ellipsoid::radius(bond, tensor),
+        }
+    }
+}
 
 /// The constants of the law.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SurfacePmb<F> {
+pub struct SurfacePmb {
     /// Micromodulus c of an untruncated family, N/m⁶.
     micromodulus: f64,
     /// c/μ with the shear modulus μ of the solid, 1/m⁴.
@@ -62,31 +72,36 @@ pub struct SurfacePmb<F> {
     /// Whether the critical stretch follows from a fracture energy, and is therefore scaled with the
     /// micromodulus.
     is_scaled: bool,
-    form: PhantomData<F>,
+    form: Form,
 }
 
-impl<F: Form> SurfacePmb<F> {
-    /// Create the law of a body, in the plane or in space.
+impl SurfacePmb {
+    /// Create the law of a 2-D or 3-D body with a surface correction.
     pub(super) fn of(given: &Given) -> Self {
         let energy = Pmb::isotropic_energy(given.dimension, given.elastic.youngs_modulus);
         let d = given.dimension.count() as f64;
         let micromodulus = Pmb::of(given).micromodulus;
+        let is_tensor = given.values.word(SURFACE_CORRECTION.name) == "tensor";
         Self {
             micromodulus,
             micromodulus_over_shear: micromodulus * d * (d + 2.0) / (2.0 * energy),
             is_scaled: given.from_fracture_energy,
-            form: PhantomData,
+            form: if is_tensor {
+                Form::Tensor
+            } else {
+                Form::Directional
+            },
         }
     }
 }
 
 /// The law has no name of its own in decks. Decks select it with `pmb` or `proportional` and a
 /// `surface_correction`.
-impl<F: Form> Declared for SurfacePmb<F> {
+impl Declared for SurfacePmb {
     const DECLARATIONS: &'static [Declaration] = &[];
 }
 
-impl<F: Form> Described for SurfacePmb<F> {
+impl Described for SurfacePmb {
     fn described(&self) -> Vec<(&'static str, Property)> {
         vec![
             (
@@ -98,7 +113,7 @@ impl<F: Form> Described for SurfacePmb<F> {
     }
 }
 
-impl<F: Form, const D: usize> Law<D> for SurfacePmb<F> {
+impl<const D: usize> Law<D> for SurfacePmb {
     /// The tensor that determines ½ h.
     type Point = Symmetric<D>;
     type BondHistory = [Lanes; 0];
@@ -120,23 +135,27 @@ impl<F: Form, const D: usize> Law<D> for SurfacePmb<F> {
     }
 
     fn constants(&self, sums: &[f64], numbers: &mut [f64]) {
-        to_entries(&F::fit::<D>(sums), numbers);
+        to_entries(&self.form.fit::<D>(sums), numbers);
     }
 
     #[inline(always)]
     fn force_state(&self, bond: &Bond<D>, end: &Symmetric<D>, _: &[Lanes; 0]) -> Along {
-        let micromodulus = F::half(bond, end) * self.micromodulus;
+        let micromodulus = self.form.half(bond, end) * self.micromodulus;
         Along(bond.extension_over_deformed * (bond.inverse * micromodulus))
     }
 
     #[inline(always)]
     fn bond_energy(&self, bond: &Bond<D>, end: &Symmetric<D>, _: &[Lanes; 0]) -> Lanes {
-        bond.stretch * bond.stretch * bond.length * F::half(bond, end) * (0.5 * self.micromodulus)
+        bond.stretch
+            * bond.stretch
+            * bond.length
+            * self.form.half(bond, end)
+            * (0.5 * self.micromodulus)
     }
 
     #[inline(always)]
     fn stiffness(&self, bond: &Bond<D>, end: &Symmetric<D>) -> Lanes {
-        F::half(bond, end) * self.micromodulus / bond.length
+        self.form.half(bond, end) * self.micromodulus / bond.length
     }
 
     #[inline(always)]
@@ -149,8 +168,8 @@ impl<F: Form, const D: usize> Law<D> for SurfacePmb<F> {
         if !self.is_scaled || !other.is_scaled {
             return Lanes::splat(1.0);
         }
-        let micromodulus =
-            F::half(bond, here) * self.micromodulus + F::half(bond, there) * other.micromodulus;
+        let micromodulus = self.form.half(bond, here) * self.micromodulus
+            + other.form.half(bond, there) * other.micromodulus;
         let untruncated = 0.5 * (self.micromodulus + other.micromodulus);
         (Lanes::splat(untruncated) / micromodulus).sqrt()
     }

@@ -4,11 +4,7 @@
 
 use nalgebra::{DMatrix, DVector, SMatrix, SymmetricEigen};
 
-use super::Form;
-use crate::lanes::Lanes;
-use crate::material::Bond;
 use crate::material::monomials::{exponents, index_of, least_squares, multiplicity};
-use crate::material::symmetric::{Symmetric, quadratic_form};
 
 /// Smallest allowed eigenvalue of H. Without this limit, stretched bonds would repel in bodies that are two
 /// or three points thick.
@@ -26,20 +22,9 @@ const LARGEST: f64 = 30.0;
 /// slightly bent strip one point wide.
 const RANK: f64 = 1e-2;
 
-/// `surface_correction = "tensor"`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Tensor;
-
-impl Form for Tensor {
-    /// Return ½ H.
-    fn fit<const D: usize>(sums: &[f64]) -> SMatrix<f64, D, D> {
-        limited(fit::<D>(sums)) * 0.5
-    }
-
-    #[inline(always)]
-    fn half<const D: usize>(bond: &Bond<D>, tensor: &Symmetric<D>) -> Lanes {
-        quadratic_form(bond, tensor)
-    }
+/// Return the tensor ½ H of a point. `sums` are those of [`super::Form::fit`].
+pub fn fit<const D: usize>(sums: &[f64]) -> SMatrix<f64, D, D> {
+    limited(least_squares_fit::<D>(sums)) * 0.5
 }
 
 /// Return a component of δ_ab δ_cd + δ_ac δ_bd + δ_ad δ_bc. The exponents say how many of the indices abcd
@@ -57,7 +42,7 @@ fn isotropic(exponents: [usize; 3]) -> f64 {
 /// ½ Σ (c/μ) |ξ| (n·H n) n⊗n⊗n⊗n Ṽ = δ_ab δ_cd + δ_ac δ_bd + δ_ad δ_bc.
 /// `sums` has an entry for each monomial of degree 6 in the components of n. The entry is the sum of
 /// |ξ| Ṽ c/μ times this monomial over the family.
-fn fit<const D: usize>(sums: &[f64]) -> SMatrix<f64, D, D> {
+fn least_squares_fit<const D: usize>(sums: &[f64]) -> SMatrix<f64, D, D> {
     let exists = |exponents: &[usize; 3]| exponents[D..].iter().all(|exponent| *exponent == 0);
     let rows: Vec<_> = exponents(4).filter(exists).collect();
     let columns: Vec<_> = exponents(2).filter(exists).collect();
@@ -122,7 +107,7 @@ mod tests {
                 }
             }
         }
-        limited(fit::<2>(&sums))
+        limited(least_squares_fit::<2>(&sums))
     }
 
     #[test]
