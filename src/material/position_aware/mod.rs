@@ -98,21 +98,27 @@ impl Form {
         }
     }
 
-    /// Return ω of eight bonds, 1/m⁵.
+    /// Return ω (1/m⁵) and σ (N/m⁷) of eight bonds.
     #[inline(always)]
-    fn dilatational<const D: usize>(self, bond: &Bond<D>, tensor: &Symmetric<D>) -> Lanes {
+    fn of_bonds<const D: usize>(self, bond: &Bond<D>, (omega, sigma): &Functions<D>) -> [Lanes; 2] {
         match self {
-            Self::Nearest => quadratic_form(bond, tensor),
-            Self::Directional => ellipsoid::radius(bond, tensor),
+            Self::Nearest => [
+                quadratic_form(bond, omega),
+                quadratic_form_of(&squares(bond), sigma),
+            ],
+            Self::Directional => [
+                ellipsoid::radius(bond, omega),
+                ellipsoid::radius(bond, sigma),
+            ],
         }
     }
 
     /// Return σ of eight bonds, N/m⁷.
     #[inline(always)]
-    fn deviatoric<const D: usize>(self, bond: &Bond<D>, tensor: &Symmetric<D>) -> Lanes {
+    fn sigma<const D: usize>(self, bond: &Bond<D>, sigma: &Symmetric<D>) -> Lanes {
         match self {
-            Self::Nearest => quadratic_form_of(&squares(bond), tensor),
-            Self::Directional => ellipsoid::radius(bond, tensor),
+            Self::Nearest => quadratic_form_of(&squares(bond), sigma),
+            Self::Directional => ellipsoid::radius(bond, sigma),
         }
     }
 }
@@ -274,12 +280,8 @@ impl<const D: usize> Law<D> for PositionAware {
     ) -> [Lanes; 3] {
         let square = bond.length * bond.length;
         let extension = square * bond.stretch;
-        let sigma = self.form.deviatoric(bond, &functions.1);
-        [
-            self.form.dilatational(bond, &functions.0) * extension,
-            sigma * extension,
-            sigma * square,
-        ]
+        let [omega, sigma] = self.form.of_bonds(bond, functions);
+        [omega * extension, sigma * extension, sigma * square]
     }
 
     #[inline(always)]
@@ -304,9 +306,9 @@ impl<const D: usize> Law<D> for PositionAware {
         _: &[Lanes; 0],
     ) -> Along {
         let shortening = Lanes::splat(1.0) - bond.extension_over_deformed;
-        let deviatoric = self.form.deviatoric(bond, &functions.1)
-            * (bond.extension_over_deformed - *mean * shortening);
-        Along(self.form.dilatational(bond, &functions.0) * (*pressure * shortening) + deviatoric)
+        let [omega, sigma] = self.form.of_bonds(bond, functions);
+        let deviatoric = sigma * (bond.extension_over_deformed - *mean * shortening);
+        Along(omega * (*pressure * shortening) + deviatoric)
     }
 
     #[inline(always)]
@@ -317,7 +319,7 @@ impl<const D: usize> Law<D> for PositionAware {
         _: &[Lanes; 0],
     ) -> Lanes {
         let extension = bond.length * (bond.stretch - *mean);
-        extension * extension * self.form.deviatoric(bond, &functions.1) * 0.5
+        extension * extension * self.form.sigma(bond, &functions.1) * 0.5
     }
 
     fn point_energy(&self, numbers: &[f64]) -> f64 {
@@ -335,7 +337,7 @@ impl<const D: usize> Law<D> for PositionAware {
 
     #[inline(always)]
     fn stiffness(&self, bond: &Bond<D>, (functions, [ratio, ..]): &Self::Point) -> Lanes {
-        self.form.deviatoric(bond, &functions.1) * *ratio
+        self.form.sigma(bond, &functions.1) * *ratio
     }
 
     #[inline(always)]
@@ -348,7 +350,7 @@ impl<const D: usize> Law<D> for PositionAware {
         if !self.is_scaled || !other.is_scaled {
             return Lanes::splat(1.0);
         }
-        let both = self.form.deviatoric(bond, &here.1) + other.form.deviatoric(bond, &there.1);
+        let both = self.form.sigma(bond, &here.1) + other.form.sigma(bond, &there.1);
         (Lanes::splat(self.untruncated_sigma() + other.untruncated_sigma()) / both).sqrt()
     }
 }
@@ -436,11 +438,8 @@ mod tests {
         });
         let of_bond = |xi: &Vector3<f64>| {
             let bond = bond(xi);
-            [
-                form.dilatational(&bond, &omega),
-                form.deviatoric(&bond, &sigma),
-            ]
-            .map(|lanes| lanes.0[0])
+            form.of_bonds(&bond, &(omega, sigma))
+                .map(|lanes| lanes.0[0])
         };
         (bonds.iter().map(of_bond).collect(), numbers[12])
     }

@@ -109,12 +109,13 @@ impl<const D: usize> Law<D> for PositionAwarePlastic {
         let nothing = Lanes::splat(0.0);
         match S {
             0 => {
-                let weight = self.elastic.form.dilatational(&bond, &functions.0) * square;
+                let [omega, _] = self.elastic.form.of_bonds(&bond, functions);
+                let weight = omega * square;
                 [weight * bond.stretch, weight, nothing]
             }
             1 => {
                 let part = bond.stretch - *mean;
-                let weighted = self.elastic.form.deviatoric(&bond, &functions.1) * square * part;
+                let weighted = self.elastic.form.sigma(&bond, &functions.1) * square * part;
                 [weighted * part, weighted, nothing]
             }
             _ => {
@@ -168,7 +169,7 @@ impl<const D: usize> Law<D> for PositionAwarePlastic {
     ) -> [Lanes; 2] {
         let stretch = bond.stretch - *plastic;
         let change = (stretch - *mean) * *plastic_fraction;
-        let factor = self.elastic.form.deviatoric(bond, &functions.1) * (bond.length * bond.length);
+        let factor = self.elastic.form.sigma(bond, &functions.1) * (bond.length * bond.length);
         let dissipated = factor * (stretch - *isotropic_stretch - change) * change;
         [*plastic + change, *loss + dissipated]
     }
@@ -220,6 +221,6 @@ impl<const D: usize> Law<D> for PositionAwarePlastic {
 
     #[inline(always)]
     fn stiffness(&self, bond: &Bond<D>, (functions, [ratio, ..]): &Self::Point) -> Lanes {
-        self.elastic.form.deviatoric(bond, &functions.1) * *ratio
+        self.elastic.form.sigma(bond, &functions.1) * *ratio
     }
 }

@@ -85,7 +85,7 @@ impl<const D: usize> Law<D> for PositionAwareViscoelastic {
         if S == 0 {
             return self.elastic.pass_contribution::<0>(bond, point, &[]);
         }
-        let factor = self.elastic.form.deviatoric(bond, &point.0.1) * (bond.length * bond.length);
+        let factor = self.elastic.form.sigma(bond, &point.0.1) * (bond.length * bond.length);
         let nothing = Lanes::splat(0.0);
         [factor * *back, nothing, nothing]
     }
@@ -119,7 +119,7 @@ impl<const D: usize> Law<D> for PositionAwareViscoelastic {
         history: &[Lanes; 3],
         step: f64,
     ) -> [Lanes; 3] {
-        let factor = self.elastic.form.deviatoric(bond, &functions.1) * (bond.length * bond.length);
+        let factor = self.elastic.form.sigma(bond, &functions.1) * (bond.length * bond.length);
         (self.relaxation).after(bond.stretch - *isotropic_stretch, history, factor, step)
     }
 
@@ -147,10 +147,7 @@ impl<const D: usize> Law<D> for PositionAwareViscoelastic {
     ) -> Lanes {
         let part = bond.stretch - *isotropic_stretch;
         let square = part * part + self.relaxation.change_of_square(part, *back);
-        square
-            * (bond.length * bond.length)
-            * self.elastic.form.deviatoric(bond, &functions.1)
-            * 0.5
+        square * (bond.length * bond.length) * self.elastic.form.sigma(bond, &functions.1) * 0.5
     }
 
     fn point_energy(&self, numbers: &[f64]) -> f64 {
@@ -172,7 +169,7 @@ impl<const D: usize> Law<D> for PositionAwareViscoelastic {
 
     #[inline(always)]
     fn stiffness(&self, bond: &Bond<D>, (functions, [ratio, ..]): &Self::Point) -> Lanes {
-        self.elastic.form.deviatoric(bond, &functions.1) * *ratio
+        self.elastic.form.sigma(bond, &functions.1) * *ratio
     }
 
     #[inline(always)]
