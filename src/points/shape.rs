@@ -35,8 +35,13 @@ pub fn bounds(shape: &Shape) -> ([f64; 3], [f64; 3]) {
 /// positions on the boundary count as outside.
 pub fn contains(shape: &Shape, position: [f64; 3], tolerance: f64) -> bool {
     match shape {
-        Shape::Box { lower, upper } => (0..3)
-            .all(|k| position[k] >= lower[k] - tolerance && position[k] <= upper[k] + tolerance),
+        Shape::Box { lower, upper } => (0..3).all(|k| {
+            // Boxes of 1-D and 2-D problems are flat along the other axes. A flat box always contains its own
+            // plane.
+            let is_flat = lower[k] == upper[k];
+            let tolerance = if is_flat { tolerance.abs() } else { tolerance };
+            position[k] >= lower[k] - tolerance && position[k] <= upper[k] + tolerance
+        }),
         Shape::Ball { centre, radius } => {
             super::distance_squared(*centre, position) <= (radius + tolerance).powi(2)
         }
@@ -88,6 +93,24 @@ mod tests {
         assert!(!contains(&plate, [0.26, 0.5, 0.0], 1e-9));
         assert!(contains(&hole, [0.26, 0.5, 0.0], 1e-9));
         assert_eq!(bounds(&plate), ([0.0; 3], [1.0, 1.0, 0.0]));
+    }
+
+    #[test]
+    fn a_flat_box_can_be_subtracted() {
+        let part = |lower, upper, across| Shape::Box {
+            lower: [lower, if across { lower } else { 0.0 }, 0.0],
+            upper: [upper, if across { upper } else { 0.0 }, 0.0],
+        };
+        for is_plate in [false, true] {
+            let rest = Shape::Difference(vec![part(0.0, 4.0, is_plate), part(1.0, 3.0, is_plate)]);
+            let at = |x: f64| [x, if is_plate { 2.0 } else { 0.0 }, 0.0];
+            assert!(contains(&rest, at(0.5), 1e-9));
+            assert!(
+                contains(&rest, at(1.0), 1e-9),
+                "on the boundary of the hole"
+            );
+            assert!(!contains(&rest, at(2.0), 1e-9));
+        }
     }
 
     #[test]
