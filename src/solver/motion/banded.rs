@@ -1,7 +1,11 @@
 //! Symmetric band matrices and their Cholesky factor.
 
-/// A pivot below this fraction of the diagonal entry in its row is round-off.
-const SINGULAR: f64 = 1e-10;
+/// A pivot above this fraction of the diagonal entry in its row is not round-off.
+const CERTAIN: f64 = 1e-4;
+
+/// Estimated round-off of a pivot, as a multiple of the machine precision times Σ A_kk x_k². See
+/// [`Banded::round_off`].
+const ROUND_OFF: f64 = 4.0;
 
 /// A symmetric, positive semidefinite band matrix, or its Cholesky factor. The lower half of the band is
 /// stored by rows.
@@ -14,6 +18,8 @@ pub struct Banded {
     entries: Vec<f64>,
     /// 1/L_ii of the factor; 0 if the pivot is round-off.
     inverse: Vec<f64>,
+    /// Diagonal entries A_ii of the matrix that was factored.
+    diagonal: Vec<f64>,
 }
 
 impl Banded {
@@ -24,6 +30,7 @@ impl Banded {
             band,
             entries: vec![0.0; size * (band + 1)],
             inverse: vec![0.0; size],
+            diagonal: vec![0.0; size],
         }
     }
 
@@ -54,6 +61,7 @@ impl Banded {
             let first = row.saturating_sub(self.band);
             let at = |column: usize| self.band + column - row;
             let diagonal = own[self.band];
+            self.diagonal[row] = diagonal;
             for column in first..row {
                 // The first column in which both rows have entries.
                 let from = first.max(column.saturating_sub(self.band));
@@ -65,15 +73,42 @@ impl Banded {
             }
             let known = &own[at(first)..self.band];
             let pivot = diagonal - dot(known, known);
-            if pivot > SINGULAR * diagonal {
+            let is_certain = pivot > CERTAIN * diagonal;
+            if is_certain || pivot > 0.0 && pivot > self.round_off(row) {
                 let root = pivot.sqrt();
-                own[self.band] = root;
+                self.entries[row * width + self.band] = root;
                 self.inverse[row] = 1.0 / root;
             } else {
-                own.fill(0.0);
+                self.entries[row * width..][..width].fill(0.0);
                 self.inverse[row] = 0.0;
             }
         }
+    }
+
+    /// Estimate the round-off of the pivot in a row, whose entries left of the diagonal are already factored.
+    ///
+    /// The pivot is the smallest value of x·A x over all x with x_row = 1 and x = 0 below the row. The
+    /// round-off of the factorization changes A by about ε A_kk in each row k, with the machine precision ε.
+    /// It therefore changes the pivot by about ε Σ A_kk x_k². In a free body, x is a rotation about the nodes
+    /// below the row, so distant nodes have large x_k, and the pivot of the rotation is round-off.
+    fn round_off(&self, row: usize) -> f64 {
+        let width = self.band + 1;
+        let mut x = vec![0.0; row + 1];
+        x[row] = 1.0;
+        let mut sum = self.diagonal[row];
+        for k in (0..=row).rev() {
+            if k < row {
+                x[k] *= self.inverse[k];
+                sum += self.diagonal[k] * x[k] * x[k];
+            }
+            let first = k.saturating_sub(self.band);
+            let known = &self.entries[k * width..][self.band + first - k..self.band];
+            let value = x[k];
+            for (x, entry) in x[first..k].iter_mut().zip(known) {
+                *x -= entry * value;
+            }
+        }
+        ROUND_OFF * f64::EPSILON * sum
     }
 
     /// Solve L Lᵀ x = b after [`Self::factor`]. `values` contains b at the call and x at the return.
@@ -143,6 +178,59 @@ mod tests {
         matrix.solve(&mut values);
         for (value, wanted) in values.iter().zip(&wanted) {
             assert!((value - wanted).abs() < 1e-12, "{values:?}");
+        }
+    }
+
+    /// Assemble the stiffness of a free square of `count`² cells. Springs of stiffness 1 lie along the edges and
+    /// the diagonals of each cell.
+    fn free_square(count: usize) -> Banded {
+        let nodes = count + 1;
+        let mut matrix = Banded::zero(2 * nodes * nodes, 2 * nodes + 3);
+        let mut spring = |[x1, y1]: [usize; 2], [x2, y2]: [usize; 2]| {
+            let (dx, dy) = (x2 as f64 - x1 as f64, y2 as f64 - y1 as f64);
+            let n = [dx, dy].map(|d| d / dx.hypot(dy));
+            let of = |x: usize, y: usize, d: usize| 2 * (y * nodes + x) + d;
+            for a in 0..2 {
+                for b in 0..2 {
+                    let stiffness = n[a] * n[b];
+                    for (row, column, value) in [
+                        (of(x1, y1, a), of(x1, y1, b), stiffness),
+                        (of(x2, y2, a), of(x2, y2, b), stiffness),
+                        (of(x1, y1, a), of(x2, y2, b), -stiffness),
+                        (of(x2, y2, a), of(x1, y1, b), -stiffness),
+                    ] {
+                        if row >= column {
+                            matrix.add(row, column, value);
+                        }
+                    }
+                }
+            }
+        };
+        for y in 0..nodes {
+            for x in 0..nodes {
+                if x < count {
+                    spring([x, y], [x + 1, y]);
+                }
+                if y < count {
+                    spring([x, y], [x, y + 1]);
+                }
+                if x < count && y < count {
+                    spring([x, y], [x + 1, y + 1]);
+                    spring([x + 1, y], [x, y + 1]);
+                }
+            }
+        }
+        matrix
+    }
+
+    /// Only the two translations and the rotation have no stiffness.
+    #[test]
+    fn a_free_square_of_any_size_has_three_singular_rows() {
+        for count in [4, 20, 40, 60] {
+            let mut matrix = free_square(count);
+            matrix.factor();
+            let singular = matrix.inverse.iter().filter(|inverse| **inverse == 0.0);
+            assert_eq!(singular.count(), 3, "{count}");
         }
     }
 
