@@ -48,7 +48,13 @@ pub fn tensor<const D: usize>(semi_axes: [f64; D], scale: f64) -> SMatrix<f64, D
 /// Return the radii (n·T n)^(−½) of an ellipsoid in the directions n of eight bonds.
 #[inline(always)]
 pub fn radius<const D: usize>(bond: &Bond<D>, tensor: &Symmetric<D>) -> Lanes {
+    radius_of(quadratic_form(bond, tensor))
+}
+
+/// Same as [`radius`], from n·T n of eight bonds.
+#[inline(always)]
+pub fn radius_of(quadratic_form: Lanes) -> Lanes {
     // Padding bonds have n = 0. Without this limit, their radii would be infinite.
-    let square = quadratic_form(bond, tensor).max(Lanes::splat(f64::MIN_POSITIVE));
+    let square = quadratic_form.max(Lanes::splat(f64::MIN_POSITIVE));
     Lanes::splat(1.0) / square.sqrt()
 }
