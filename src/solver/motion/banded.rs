@@ -76,6 +76,14 @@ impl Banded {
         }
     }
 
+    /// Return the rank of the matrix after [`Self::factor`]: the number of pivots that are not round-off.
+    pub fn rank(&self) -> usize {
+        self.inverse
+            .iter()
+            .filter(|inverse| **inverse != 0.0)
+            .count()
+    }
+
     /// Solve L Lᵀ x = b after [`Self::factor`]. `values` contains b at the call and x at the return.
     pub fn solve(&self, values: &mut [f64]) {
         let width = self.band + 1;
