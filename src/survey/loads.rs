@@ -10,9 +10,9 @@ use crate::problem::{Action, Condition, Depth, PointSource, Problem, Stage};
 use crate::solver::Simulation;
 use crate::solver::conditions::members;
 
-/// Largest ratio of the thickness of a loaded layer to the depth of the load. A warning is printed if the ratio
-/// is larger. A layer that is one cell thick and perpendicular to a diagonal of the cells may contain two rows
-/// of cells, which together are up to √2 cells thick.
+/// Largest ratio of the thickness of a loaded layer to the depth of the load. A warning is printed if the
+/// ratio is larger. A layer one cell thick whose normal is a diagonal of the cells may contain two rows of
+/// cells, which together are up to √2 cells thick.
 const MAX_THICKNESS_RATIO: f64 = 1.6;
 
 /// Largest ratio of a row of cells to the shortest row through the same cell, if the row counts for the
@@ -156,8 +156,8 @@ fn without_effect<const D: usize>(
 }
 
 /// Check a traction or pressure with the default depth. This depth is, for each point, the spacing of the
-/// body to which the point belongs. Warn if the loaded layer is thicker than the depth by more than a factor of
-/// [`MAX_THICKNESS_RATIO`]. Layers of more than [`LARGE_LAYER`] points are not checked. Collective.
+/// body to which the point belongs. Warn if the loaded layer is thicker than the depth by more than a factor
+/// of [`MAX_THICKNESS_RATIO`]. Layers of more than [`LARGE_LAYER`] points are not checked. Collective.
 fn layer<const D: usize>(
     simulation: &Simulation<'_, D>,
     condition: &Condition,
@@ -265,9 +265,9 @@ fn thickness<const D: usize>(problem: &Problem, cells: Vec<[i64; 4]>) -> Option<
 }
 
 /// Return the thickness of a layer at one of its cells, in cells. `rows` contains the number of cells in the
-/// row through this cell along each axis. The row along the axis k through a layer of the thickness T with the
-/// unit normal n has the length L_k = T/|n_k|, so T = (Σ L_k⁻²)^(−1/2). The sum does not include rows that are
-/// longer than [`MAX_ROW_RATIO`] times the shortest row.
+/// row through this cell along each axis. The row along the axis k through a layer of the thickness T with
+/// the unit normal n has the length L_k = T/|n_k|, so T = (Σ L_k⁻²)^(−1/2). The sum does not include rows that
+/// are longer than [`MAX_ROW_RATIO`] times the shortest row.
 fn local_thickness(rows: &[f64]) -> f64 {
     let shortest = rows.iter().copied().fold(f64::INFINITY, f64::min);
     let across = rows.iter().filter(|row| **row <= MAX_ROW_RATIO * shortest);

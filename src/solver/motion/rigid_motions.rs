@@ -14,8 +14,8 @@ use super::held::PLANES;
 use super::pieces::Piece;
 
 impl<const D: usize> Simulation<'_, D> {
-    /// Describe a loaded or supported piece whose supports leave rigid motions free; `None` if there is no such
-    /// piece. Of several pieces, describe the one with the smallest point id. Collective.
+    /// Describe a loaded or supported piece whose supports leave rigid motions free; `None` if there is no
+    /// such piece. Of several pieces, describe the one with the smallest point id. Collective.
     pub(super) fn describe_free_motions(&mut self) -> Option<String> {
         let pieces = self.find_pieces(self.unloaded_points());
         let is_free = self.conditions.free_components(self.model.volume.len());
@@ -38,9 +38,9 @@ impl<const D: usize> Simulation<'_, D> {
         })
     }
 
-    /// Return the number of small rigid motions of a piece from its reference positions that its supports leave
-    /// free. An entry of `is_free` is 0 if a support prescribes this component of the point, otherwise 1.
-    /// Collective.
+    /// Return the number of small rigid motions of a piece from its reference positions that its supports
+    /// leave free. An entry of `is_free` is 0 if a support prescribes this component of the point, otherwise
+    /// 1. Collective.
     fn count_free_motions(&self, piece: &Piece, is_free: &[Vec<f64>; D]) -> usize {
         let position = |point: &usize| self.model.position(*point);
         // The largest coordinates, then the largest negative coordinates.
