@@ -1,5 +1,6 @@
 //! Validation of the history's content and interval.
 
+use super::fields::history_field;
 use super::grammar::{self, Deck, Text};
 use super::names::suits_a_column;
 use super::number::{Number, Vector};
@@ -136,7 +137,7 @@ fn front(
         None => Ok(default),
         Some(number) => scope.positive(number, &format!("{key} {name}")),
     };
-    let field = field(scope, &front.field, &format!("{key} field"))?;
+    let field = history_field(scope, &front.field, &format!("{key} field"))?;
     Ok(problem::Front {
         name: name.to_owned(),
         span: table.span(),
@@ -152,16 +153,6 @@ fn front(
             "at least 0",
         )?,
     })
-}
-
-/// Find an output field by name. Ranks and fragments are excluded, because they are labels and not physical
-/// quantities.
-fn field(scope: &Scope, name: &Text, key: &str) -> Result<Field> {
-    let fields = Field::ALL.into_iter();
-    let fields = fields.filter(|field| !matches!(field, Field::Rank | Field::Fragment));
-    let fields: Vec<Field> = fields.collect();
-    let names = fields.iter().map(|field| field.name());
-    Ok(fields[find(scope.source, name, names, key)?])
 }
 
 /// Return the component or invariant that a table requests. For a scalar field, the default is its only
@@ -213,7 +204,7 @@ fn probe(scope: &Scope, name: &str, table: &Spanned<grammar::Probe>) -> Result<p
     let key = format!("{key} fields");
     let mut fields = Vec::new();
     for name in &probe.fields {
-        let field = field(scope, name, &key)?;
+        let field = history_field(scope, name, &key)?;
         let wrong = if matches!(field, Field::Displacement | Field::Velocity) {
             "is always recorded"
         } else if fields.contains(&field) {
@@ -241,7 +232,7 @@ fn statistics(
 ) -> Result<problem::FieldStatistics> {
     let key = table_header(scope, "field", name, table)?;
     let rule = table.get_ref();
-    let field = field(scope, &rule.field, &format!("{key} field"))?;
+    let field = history_field(scope, &rule.field, &format!("{key} field"))?;
     let given = rule.of.get_ref();
     if given.is_empty() {
         let message = format!("{key} of: must name at least one of {STATISTICS}");

@@ -8,6 +8,7 @@ mod contact;
 mod damage;
 mod difference;
 mod explain;
+mod fields;
 mod from_toml;
 pub mod grammar;
 mod group_name;

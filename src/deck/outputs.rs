@@ -1,7 +1,8 @@
 //! Validation of the settings for results (content and interval), checkpoints and rebalancing.
 
+use super::fields::output_field;
 use super::grammar::{self, Balance, Deck};
-use super::resolve::{Scope, find};
+use super::resolve::Scope;
 use super::sets::find_set;
 use crate::deck::spanned::Spanned;
 use crate::error::Result;
@@ -76,20 +77,11 @@ fn of_table(
     end: f64,
 ) -> Result<problem::Output> {
     let section = name.map_or("[output]".to_owned(), |name| format!("[output.{name}]"));
-    let names = problem::Field::ALL.map(problem::Field::name);
     let fields = match &output.fields {
         None => problem::DEFAULT_FIELDS.to_vec(),
         Some(fields) => fields
             .iter()
-            .map(|field| {
-                let index = find(
-                    scope.source,
-                    field,
-                    names.into_iter(),
-                    &format!("{section} fields"),
-                )?;
-                Ok(problem::Field::ALL[index])
-            })
+            .map(|field| output_field(scope, field, &format!("{section} fields")))
             .collect::<Result<Vec<_>>>()?,
     };
     if let Some(twice) = (1..fields.len()).find(|k| fields[..*k].contains(&fields[*k])) {

@@ -1,21 +1,23 @@
 //! Warnings about loads, supports and temperatures that do not have the intended effect.
 
-use std::collections::HashSet;
-
 use crate::comm::sum::reduce;
 use crate::comm::{ExactSum, total};
 use crate::component::AXES;
 use crate::error::Warning;
 use crate::expression::Expression;
 use crate::message::format_number;
-use crate::problem::{Action, Condition, Depth, Problem, Stage};
+use crate::problem::{Action, Condition, Depth, PointSource, Problem, Stage};
 use crate::solver::Simulation;
 use crate::solver::conditions::members;
 
-/// Largest factor between the thickness of a loaded layer and the depth of the load. A warning is printed if
-/// the thickness is larger or smaller than the depth by more than this factor. The thickness is measured
-/// along the axes. For a curved layer one cell thick, the measured thickness is therefore up to π/2 cells.
-const MAX_THICKNESS_RATIO: f64 = 1.8;
+/// Largest ratio of the thickness of a loaded layer to the depth of the load. A warning is printed if the
+/// ratio is larger. A layer one cell thick whose normal is a diagonal of the cells may contain two rows of
+/// cells, which together are up to √2 cells thick.
+const MAX_THICKNESS_RATIO: f64 = 1.6;
+
+/// Largest ratio of a row of cells to the shortest row through the same cell, if the row counts for the
+/// thickness of an inclined layer. Longer rows lie along the layer.
+const MAX_ROW_RATIO: f64 = 1.5;
 
 /// Maximum number of points of a layer for which the thickness is checked.
 const LARGE_LAYER: u64 = 4_000_000;
@@ -154,9 +156,8 @@ fn without_effect<const D: usize>(
 }
 
 /// Check a traction or pressure with the default depth. This depth is, for each point, the spacing of the
-/// body to which the point belongs. Warn if the depth differs from the thickness of the loaded layer by more
-/// than a factor of [`MAX_THICKNESS_RATIO`]. Layers of more than [`LARGE_LAYER`] points are not checked.
-/// Collective.
+/// body to which the point belongs. Warn if the loaded layer is thicker than the depth by more than a factor
+/// of [`MAX_THICKNESS_RATIO`]. Layers of more than [`LARGE_LAYER`] points are not checked. Collective.
 fn layer<const D: usize>(
     simulation: &Simulation<'_, D>,
     condition: &Condition,
@@ -170,34 +171,39 @@ fn layer<const D: usize>(
     // Gather body and cell of all points of the layer on rank 0.
     let mut cells = vec![Vec::new(); comm.size()];
     for point in points {
-        let body = problem.body_of(usize::from(model.block[*point as usize]));
+        let index = problem.body_of(usize::from(model.block[*point as usize]));
+        let body = &problem.bodies[index];
         // Skip points of bodies without a single spacing. Only sets of conditions that act in no stage may
         // have such points.
-        let Some(edge) = problem.bodies[body].single_spacing(D) else {
+        let (Some(edge), PointSource::Lattice { origin, .. }) =
+            (body.single_spacing(D), &body.points)
+        else {
             continue;
         };
         let position = model.position(*point as usize);
-        let cell: [i64; 3] = std::array::from_fn(|k| (position[k] / edge).floor() as i64);
+        let along = |k: usize| ((position[k] - origin[k]) / edge).floor() as i64;
         cells[0].extend_from_slice(bytemuck::cast_slice(&[
-            body as i64,
-            cell[0],
-            cell[1],
-            cell[2],
+            index as i64,
+            along(0),
+            along(1),
+            along(2),
         ]));
     }
     let received = comm.all_to_all(cells).concat();
-    let cells: HashSet<[i64; 4]> = bytemuck::pod_collect_to_vec::<u8, i64>(&received)
+    let mut cells: Vec<[i64; 4]> = bytemuck::pod_collect_to_vec::<u8, i64>(&received)
         .chunks_exact(4)
         .map(|cell| [cell[0], cell[1], cell[2], cell[3]])
         .collect();
-    let found = thickness::<D>(problem, &cells);
+    cells.sort_unstable();
+    cells.dedup();
+    let found = thickness::<D>(problem, cells);
     let mut packed = found.map_or(Vec::new(), |found| bytemuck::cast_slice(&found).to_vec());
     comm.broadcast(0, &mut packed);
     let found = bytemuck::pod_collect_to_vec::<u8, f64>(&packed);
     let [thickness, depth] = found[..] else {
         return;
     };
-    if !(MAX_THICKNESS_RATIO.recip()..MAX_THICKNESS_RATIO).contains(&(thickness / depth)) {
+    if thickness / depth > MAX_THICKNESS_RATIO {
         let words = format!(
             "acts on a layer about {thickness:.2e} m thick but is divided by the spacing, {} m; give the thickness of \
              the layer as `depth`",
@@ -207,31 +213,65 @@ fn layer<const D: usize>(
     }
 }
 
-/// Return the thickness of a layer and the cell edge, m. Along each axis, adjacent cells form rows. The
-/// thickness is the smallest of the mean row lengths along the axes. If the layer has points of several
-/// bodies, the result is that of the body for which thickness and cell edge differ most. `None` if there are
-/// no cells. Each entry of `cells` contains the index of a body and the three indices of a cell.
-fn thickness<const D: usize>(problem: &Problem, cells: &HashSet<[i64; 4]>) -> Option<[f64; 2]> {
-    let of_body = |body: usize| {
-        let own = || cells.iter().filter(move |cell| cell[0] == body as i64);
-        let row_length = |k: usize| {
-            let begins = |cell: &&[i64; 4]| {
-                let mut before = **cell;
-                before[1 + k] -= 1;
-                !cells.contains(&before)
-            };
-            let rows = own().filter(begins).count();
-            own().count() as f64 / rows as f64
+/// A cell of a layer.
+struct Cell {
+    /// Index of the body and the three indices of the cell.
+    index: [i64; 4],
+    /// For each axis, the number of cells in the row through this cell. A row consists of adjacent cells of
+    /// the layer along an axis.
+    rows: [f64; 3],
+}
+
+/// Return the thickness of a layer and the cell edge, m. The thickness is the harmonic mean of
+/// [`local_thickness`] over the cells. If the layer has points of several bodies, the result is that of the
+/// body with the largest ratio of thickness to cell edge. `None` if there are no cells. Each entry of `cells`
+/// contains the index of a body and the three indices of a cell; no entry occurs twice.
+fn thickness<const D: usize>(problem: &Problem, cells: Vec<[i64; 4]>) -> Option<[f64; 2]> {
+    let rows = [0.0; 3];
+    let mut cells: Vec<Cell> = cells
+        .into_iter()
+        .map(|index| Cell { index, rows })
+        .collect();
+    for k in 0..D {
+        // With the index along the axis k as the last key, the cells of a row follow one another.
+        cells.sort_unstable_by_key(|cell| {
+            let mut key = cell.index;
+            key[1 + k..].rotate_left(1);
+            key
+        });
+        let is_adjacent = |cell: &Cell, next: &Cell| {
+            let mut index = cell.index;
+            index[1 + k] += 1;
+            index == next.index
         };
-        own().next()?;
-        let cells_deep = (0..D).map(row_length).fold(f64::INFINITY, f64::min);
-        let edge = problem.bodies[body].single_spacing(D)?;
+        for row in cells.chunk_by_mut(is_adjacent) {
+            let length = row.len() as f64;
+            row.iter_mut().for_each(|cell| cell.rows[k] = length);
+        }
+    }
+    let of_body = |cells: &[Cell]| {
+        let inverse = cells
+            .iter()
+            .map(|cell| local_thickness(&cell.rows[..D]).recip());
+        let cells_deep = cells.len() as f64 / inverse.sum::<f64>();
+        let edge = problem.bodies[cells[0].index[0] as usize].single_spacing(D)?;
         Some([cells_deep * edge, edge])
     };
-    let difference = |[thickness, edge]: &[f64; 2]| libm::log(thickness / edge).abs();
-    (0..problem.bodies.len())
+    let ratio = |[thickness, edge]: &[f64; 2]| thickness / edge;
+    cells
+        .chunk_by(|a, b| a.index[0] == b.index[0])
         .filter_map(of_body)
-        .max_by(|a, b| difference(a).total_cmp(&difference(b)))
+        .max_by(|a, b| ratio(a).total_cmp(&ratio(b)))
+}
+
+/// Return the thickness of a layer at one of its cells, in cells. `rows` contains the number of cells in the
+/// row through this cell along each axis. The row along the axis k through a layer of the thickness T with
+/// the unit normal n has the length L_k = T/|n_k|, so T = (Σ L_k⁻²)^(−1/2). The sum does not include rows that
+/// are longer than [`MAX_ROW_RATIO`] times the shortest row.
+fn local_thickness(rows: &[f64]) -> f64 {
+    let shortest = rows.iter().copied().fold(f64::INFINITY, f64::min);
+    let across = rows.iter().filter(|row| **row <= MAX_ROW_RATIO * shortest);
+    across.map(|row| row.powi(-2)).sum::<f64>().sqrt().recip()
 }
 
 /// Warn of pressures whose normal points into the body.

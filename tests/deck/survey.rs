@@ -24,9 +24,14 @@ fn plate(extra: &str) -> String {
 
 /// Return the warnings of a plane deck; they must be equal on any number of ranks.
 fn warnings(text: &str) -> Vec<String> {
-    let alone = simulate::<2, _>(text, |mut simulation| Survey::new(&mut simulation).warnings);
+    warnings_in::<2>(text)
+}
+
+/// Return the warnings of a deck of a dimension; they must be equal on any number of ranks.
+fn warnings_in<const D: usize>(text: &str) -> Vec<String> {
+    let alone = simulate::<D, _>(text, |mut simulation| Survey::new(&mut simulation).warnings);
     for ranks in [2, 3] {
-        for warnings in simulate_on::<2, _>(ranks, text, |mut simulation| {
+        for warnings in simulate_on::<D, _>(ranks, text, |mut simulation| {
             Survey::new(&mut simulation).warnings
         }) {
             assert_eq!(warnings, alone, "{ranks} ranks");
@@ -198,6 +203,57 @@ fn loads_on_a_layer_of_another_depth() {
              spacing, 0.5 m; give the thickness of the layer as `depth`",
         ],
     );
+}
+
+/// Return the thickness (m) that the warning about a loaded layer names; `None` without this warning. The
+/// spacing is 1 m. `place` is the condition for the layer.
+fn thickness_of_layer<const D: usize>(shape: &str, place: &str) -> Option<f64> {
+    let (dimension, traction) = match D {
+        2 => ("plane-stress", "['t', 0]"),
+        _ => ("3d", "['t', 0, 0]"),
+    };
+    let text = format!(
+        "dimension = '{dimension}'
+        grid = {{ spacing = 1, horizon = 2.5 }}
+        material.glass.pmb = {{ density = 2, youngs_modulus = 5 }}
+        body.b = {{ material = 'glass', shape.{shape} }}
+        set.s.where = '{place}'
+        condition.pull = {{ set = 's', traction = {traction} }}
+        time.end = 10
+        "
+    );
+    let begin = "[condition.pull] traction: acts on a layer about ";
+    let found = warnings_in::<D>(&text);
+    let rest = found.iter().find_map(|text| text.strip_prefix(begin))?;
+    let (number, _) = rest.split_once(" m thick").unwrap();
+    Some(number.parse().unwrap())
+}
+
+#[track_caller]
+fn is_thick(thickness: Option<f64>, wanted: f64) {
+    let thickness = thickness.unwrap();
+    assert!((thickness / wanted - 1.0).abs() < 0.12, "{thickness}");
+}
+
+#[test]
+fn layers_along_curved_and_oblique_faces() {
+    let ring = "difference = [{ disc = { centre = [0, 0], radius = 24 } }, { disc = { centre = [0, 0], radius = 12 } }]";
+    let of_ring = |place| thickness_of_layer::<2>(ring, place);
+    assert_eq!(of_ring("hypot(x, y) < 13"), None);
+    assert_eq!(of_ring("hypot(x, y) > 23"), None);
+    is_thick(of_ring("hypot(x, y) < 14"), 2.0);
+    is_thick(of_ring("hypot(x, y) > 21"), 3.0);
+    // A face along the diagonal of the cells; two rows of cells lie in a layer one cell thick.
+    let triangle = "polygon.vertices = [[0, 0], [20.2, 0], [0, 20.2]]";
+    let of_triangle = |place| thickness_of_layer::<2>(triangle, place);
+    assert_eq!(of_triangle("x + y > 20.2 - sqrt(2)"), None);
+    is_thick(of_triangle("x + y > 20.2 - 2*sqrt(2)"), 2.0);
+    let shell = "difference = [{ sphere = { centre = [0, 0, 0], radius = 10 } }, { sphere = { centre = [0, 0, 0], radius = 5 } }]";
+    let of_shell = |place| thickness_of_layer::<3>(shell, place);
+    assert_eq!(of_shell("hypot(hypot(x, y), z) < 6"), None);
+    assert_eq!(of_shell("hypot(hypot(x, y), z) > 9"), None);
+    is_thick(of_shell("hypot(hypot(x, y), z) < 7"), 2.0);
+    is_thick(of_shell("hypot(hypot(x, y), z) > 7"), 3.0);
 }
 
 #[test]

@@ -311,6 +311,60 @@ fn the_worst_point_is_named_where_halving_does_not_help() {
 }
 
 #[test]
+fn a_compressed_piece_that_can_move_rigidly_is_named() {
+    let failure = |method: &str, supports: &str| {
+        let deck = format!(
+            "dimension = 'plane-stress'
+            thickness = 1e-3
+            grid = {{ spacing = 1e-3, horizon = 3e-3 }}
+            material.m.pmb = {{ density = 1000, youngs_modulus = 1e9 }}
+            body.b = {{ material = 'm', shape.box = {{ lower = [0, 0], upper = [0.02, 8e-3] }} }}
+            set.left.where = 'x < 1e-3'
+            set.right.where = 'x > 0.019'
+            set.pin.where = 'x < 1e-3 && y < 1e-3'
+            set.lower.where = 'y < 1e-3'
+            condition.left = {{ set = 'left', traction = ['1e7*t', 0] }}
+            condition.right = {{ set = 'right', traction = ['-1e7*t', 0] }}
+            {supports}
+            time = {{ end = 1, method = '{method}', {method} = {{ load_steps = 1, tolerance = 1e-13 }} }}
+            "
+        );
+        let iterations = match method {
+            "static" => "max_iterations = 1, max_halvings = 0, load_steps",
+            _ => "iterations = 1, load_steps",
+        };
+        let deck = deck.replace("load_steps", iterations);
+        let texts = simulate_on::<2, _>(2, &deck, |mut simulation| {
+            loop {
+                simulation.advance();
+                if let Err(error) = simulation.check() {
+                    return error.message;
+                }
+                assert!(!simulation.is_over());
+            }
+        });
+        assert!(texts.iter().all(|text| *text == texts[0]));
+        texts[0].clone()
+    };
+    let pin = "condition.pin = { set = 'pin', displacement = [0, 0] }";
+    let roller = "condition.lower = { set = 'lower', displacement = ['free', 0] }";
+    let both = format!("{pin}\n{roller}");
+    for (supports, free) in [("", 3), (pin, 1), (roller, 1), (&both, 0)] {
+        let text = failure("static", supports);
+        assert!(text.contains("the unbalanced forces are still "), "{text}");
+        let begin = "or use `method = \"relaxation\"`. The supports leave ";
+        let found = text.split_once(begin).map(|(_, rest)| rest.to_owned());
+        let wanted = format!(
+            "{free} of 3 rigid motions of a piece of body `b` free; `static` may find no equilibrium if loads \
+             compress such a piece. The piece has 160 points; point 0 at [0.0005, 0.0005] m is one of them. Prescribe \
+             displacements that prevent these translations and rotations, or use `method = \"relaxation\"`"
+        );
+        assert_eq!(found, (free > 0).then_some(wanted), "{text}");
+        assert!(!failure("relaxation", supports).contains("rigid"));
+    }
+}
+
+#[test]
 fn a_loaded_piece_that_nothing_holds_is_named() {
     let deck = bent("load_steps = 1, max_iterations = 2").replace(
         "set = 'left', displacement = [0, 0]",

@@ -18,6 +18,9 @@ const ROUND_OFF: f64 = 1e-9;
 /// angle. The arm of a point is its position relative to the centroid of the piece.
 const SMALL_TORQUE: f64 = 0.01;
 
+/// For each axis, the components of the displacement in a rotation about this axis.
+pub(super) const PLANES: [[usize; 2]; 3] = [[1, 2], [2, 0], [0, 1]];
+
 /// Loads on a piece along one axis. No support holds the piece along this axis.
 struct UnheldLoad {
     piece: Piece,
@@ -206,7 +209,6 @@ impl<const D: usize> Simulation<'_, D> {
     /// Find a piece that the present loads rotate, and that no support holds in the plane of the rotation. Of
     /// several pieces, return the one with the smallest point id. Collective.
     fn find_unheld_torque(&self, pieces: &Pieces<D>) -> Option<UnheldTorque> {
-        const PLANES: [[usize; 2]; 3] = [[1, 2], [2, 0], [0, 1]];
         let planes = || (0..3).filter(|axis| PLANES[*axis].iter().all(|d| *d < D));
         let is_suspect = |point: usize, axis: usize| {
             let plane = PLANES[axis];

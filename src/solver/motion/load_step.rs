@@ -30,6 +30,7 @@ use rayon::prelude::*;
 use crate::comm::sum::reduce;
 use crate::comm::{ExactSum, Found, least, total};
 use crate::error::{Error, Result};
+use crate::problem::Method;
 use crate::solver::Simulation;
 use crate::solver::bonds::BondUpdate;
 use crate::solver::conditions::Work;
@@ -365,7 +366,8 @@ impl<const D: usize> Simulation<'_, D> {
     /// # Errors
     /// If the load step has failed. In runs without contact, the message names a piece that is loaded along
     /// an axis, but that no support holds along this axis. In runs with contact, or if there is no such
-    /// piece, the message describes the unbalanced forces, or says that forces are not finite.
+    /// piece, the message describes the unbalanced forces, or says that forces are not finite. With Newton's
+    /// method, it also names a piece whose supports leave rigid motions free.
     pub(in crate::solver) fn check_equilibrium(&mut self) -> Result<()> {
         if !self.progress.load_step.has_failed {
             return Ok(());
@@ -382,12 +384,18 @@ impl<const D: usize> Simulation<'_, D> {
             self.check_pieces_are_held(&failure)?;
         }
         let residual = self.progress.load_step.residual;
-        let remedy = self.time_rule().method.remedy();
+        let method = self.time_rule().method;
         let cause = if residual.is_finite() {
+            let free_motions = match method {
+                Method::Static(_) => self.describe_free_motions(),
+                Method::Explicit | Method::Relaxation(_) => None,
+            };
             format!(
-                "the unbalanced forces are still {residual:.1e} of {}{}. If the body can carry the loads, {remedy}",
+                "the unbalanced forces are still {residual:.1e} of {}{}. If the body can carry the loads, {}{}",
                 self.progress.load_step.reference(),
-                self.worst_point()
+                self.worst_point(),
+                method.remedy(),
+                free_motions.map_or(String::new(), |text| format!(". {text}"))
             )
         } else {
             "forces are not finite; reduce the loads".to_owned()

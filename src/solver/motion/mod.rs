@@ -13,6 +13,7 @@ pub mod load_step;
 pub mod newton;
 mod pieces;
 pub mod relaxation;
+mod rigid_motions;
 pub mod saved;
 pub mod stable_step;
 pub mod undo;
