@@ -2724,6 +2724,25 @@ fn time_steps_of_peridigm_begin_at_the_first_one() {
         1,
     );
     assert_eq!(ends(&load_steps), [4e-3]);
+/// Young's modulus is enough for a bond-based material.
+#[test]
+fn a_bond_based_material_of_peridigm_has_one_constant() {
+    let folder = Folder::new("one-constant");
+    let text = TWO_POINTS
+        .replacen("\"Elastic\"", "\"Elastic Bond Based\"", 1)
+        .replacen("Bulk Modulus: 12.0e6", "Young's Modulus: 3.0e7", 1)
+        .replacen("Shear Modulus: 5.0e6", "Poisson's Ratio: 0.25", 1);
+    let imported = folder.import("bonds.yaml", &text).unwrap();
+    folder.problem(&imported);
+    let key = |name: &str| format!("Peridigm > Materials > Soft Solid > {name}");
+    assert_eq!(fate(&imported, &key("Young's Modulus")).0, Fate::Taken);
+    let note = "the other constants determine the stiffness of a bond-based material";
+    assert_eq!(
+        fate(&imported, &key("Poisson's Ratio")),
+        (Fate::LeftOut, note)
+    );
+}
+
 }
 
 /// Rotated axes of PeriLab: R = R_x R_y R_z, or its inverse without a stiffness matrix; in plane problems,
