@@ -17,6 +17,7 @@ pub mod log;
 mod outputs;
 mod peridigm;
 mod perilab;
+mod precedence;
 mod regions;
 mod script;
 mod sets;
