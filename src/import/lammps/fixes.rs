@@ -133,10 +133,10 @@ pub(super) fn fix(
         }
         Ok(vector)
     };
-    let volume = spacing.powi(3);
     let name = format!("fix {id}");
     let Some((count, keywords)) = form(style, rest.first().copied()) else {
         let note = format!("fix {style} has no counterpart");
+                        Err(_) if factor == 1.0 => Value::text(text),
         if is_load(style) {
             translation.leave_out_load(node, "condition", &name, &note);
         } else {
@@ -231,7 +231,8 @@ pub(super) fn fix(
             })
         }
         ("addforce", _) => {
-            let force = vector(rest, 1.0 / volume).map_err(|m| wrong(translation, command, m))?;
+            // A force of `atom_style peri` is a force density: LAMMPS divides it by the density.
+            let force = vector(rest, 1.0).map_err(|m| wrong(translation, command, m))?;
             let zero = |value: Value| {
                 if value == Value::text("free") {
                     Value::Number("0".to_owned())
@@ -242,7 +243,7 @@ pub(super) fn fix(
             Some((
                 "body_force",
                 force.into_iter().map(zero).collect(),
-                "body_force: force over the volume of a point",
+                "body_force",
             ))
         }
         _ => None,
@@ -426,7 +427,7 @@ fn indent(
     }
     translation.add(section);
     let note = format!(
-        "[rigid.{written}]: a layer of the points' material in place of the force K (r − R)² on each atom"
+        "[rigid.{written}]: a layer of the points' material in place of the force density K (r − R)² at each atom"
     );
     translation.log.note(node, Fate::Approximated, note);
     if arguments[1] != "all" {

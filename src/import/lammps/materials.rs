@@ -65,7 +65,7 @@ pub(super) fn write_bodies(
     let mut materials: Vec<(u32, Material, Option<String>, Value)> = Vec::new();
     for atoms in &model.atoms {
         if !materials.iter().any(|(kind, ..)| *kind == atoms.kind) {
-            let made = write_material(translation, model, atoms.kind, law, spacing)?;
+            let made = write_material(translation, model, atoms.kind, law)?;
             materials.push((atoms.kind, made.0, made.1, made.2));
         }
         let made = materials.iter().find(|(kind, ..)| *kind == atoms.kind);
@@ -113,7 +113,6 @@ fn write_material(
     model: &Model,
     kind: u32,
     law: &'static str,
-    spacing: f64,
 ) -> Result<(Material, Option<String>, Value)> {
     let Some(coefficients) = coefficients(model, kind) else {
         let message = format!("there is no `pair_coeff` for type {kind}");
@@ -178,7 +177,7 @@ fn write_material(
         _ => {}
     }
     if let Some(drag) = model.drag {
-        section.set("damping", Value::number(drag / (density * spacing.powi(3))));
+        section.set("damping", Value::number(drag / density));
     }
     translation.add(section);
     let note = format!("[material.{written}.{law}] and the horizon");

@@ -54,7 +54,7 @@ struct Model {
     densities: Vec<(Option<u32>, f64)>,
     /// Groups: name, selection and node.
     groups: Vec<(String, Group, Node)>,
-    /// Damping of all atoms: force divided by velocity, N s/m.
+    /// Damping of all atoms: force density divided by velocity, N s/m⁴.
     drag: Option<f64>,
     /// Velocities of groups in the order of the commands.
     velocities: Vec<Velocity>,
