@@ -124,26 +124,41 @@ impl Constants {
         Some(key)
     }
 
-    /// Write the only constant of a bond-based law: Young's modulus, or the bulk modulus. Return false if
-    /// the constants determine neither modulus.
+    /// Write the only constant of a bond-based law: Young's modulus, or the bulk modulus. Return the keys of
+    /// the constants that determine it. Return `None` if the constants determine neither modulus.
     ///
     /// `factor` is used only if the bulk modulus is the only constant. With `factor`, the bulk modulus is
     /// that of a plane problem, and `factor` is Young's modulus divided by this bulk modulus. Without
     /// `factor`, the bulk modulus is that of a solid in 3-D.
-    pub fn write_one(&self, section: &mut Section, factor: Option<f64>) -> bool {
+    pub fn write_one(
+        &self,
+        section: &mut Section,
+        factor: Option<f64>,
+    ) -> Option<&'static [&'static str]> {
         let find = |key: &str| self.given.iter().find(|(known, ..)| *known == key);
         if let Some((key, _, value)) = find("youngs_modulus") {
             section.set(*key, value.clone());
+            Some(&["youngs_modulus"])
         } else if let Some([k, g]) = self.moduli() {
             section.set("youngs_modulus", Value::number(9.0 * k * g / (3.0 * k + g)));
+            Some(match (find("bulk_modulus"), find("shear_modulus")) {
+                (Some(_), Some(_)) => &["bulk_modulus", "shear_modulus"],
+                (Some(_), None) => &["bulk_modulus", "poisson_ratio"],
+                _ => &["shear_modulus", "poisson_ratio"],
+            })
         } else if let (Some((_, bulk, _)), Some(factor)) = (find("bulk_modulus"), factor) {
             section.set("youngs_modulus", Value::number(factor * bulk));
-        } else if let Some((key, _, value)) = find("bulk_modulus") {
-            section.set(*key, value.clone());
+            Some(&["bulk_modulus"])
         } else {
-            return false;
+            let (key, _, value) = find("bulk_modulus")?;
+            section.set(*key, value.clone());
+            Some(&["bulk_modulus"])
         }
-        true
+    }
+
+    /// Return the keys of the constants in the new deck.
+    pub fn keys(&self) -> impl Iterator<Item = &'static str> + '_ {
+        self.given.iter().map(|(key, ..)| *key)
     }
 }
 

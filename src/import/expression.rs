@@ -7,10 +7,10 @@
 use crate::expression::{Expression, Variable, number_length};
 
 /// Maximum nesting depth of parentheses and blocks.
-const DEEPEST: usize = 48;
+pub(super) const DEEPEST: usize = 48;
 
 /// Maximum length of a translated expression, bytes.
-const LONGEST: usize = 4096;
+pub(super) const LONGEST: usize = 4096;
 
 /// Source language of an expression.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -63,16 +63,26 @@ pub fn rewrite(
 
 /// A token of an expression.
 #[derive(Debug, Clone, PartialEq)]
-enum Token {
+pub(super) enum Token {
     Number(String),
     Name(String),
     Symbol(&'static str),
 }
 
+impl Token {
+    /// Return the text of the token.
+    pub(super) fn text(&self) -> &str {
+        match self {
+            Self::Number(text) | Self::Name(text) => text,
+            Self::Symbol(symbol) => symbol,
+        }
+    }
+}
+
 /// The symbols. A symbol comes before its own prefixes, so the longest match is found first.
-const SYMBOLS: [&str; 27] = [
-    "<=", ">=", "==", "!=", "&&", "||", "**", "+", "-", "*", "/", "^", "(", ")", ",", "<", ">",
-    "!", "=", ";", "{", "}", "?", ":", "&", "|", "≤",
+const SYMBOLS: [&str; 29] = [
+    "<=", ">=", "==", "!=", "&&", "||", "|^", "**", "+", "-", "*", "/", "%", "^", "(", ")", ",",
+    "<", ">", "!", "=", ";", "{", "}", "?", ":", "&", "|", "≤",
 ];
 
 fn tokens(text: &str, dialect: Dialect) -> Result<Vec<Token>, String> {
@@ -103,7 +113,7 @@ fn tokens(text: &str, dialect: Dialect) -> Result<Vec<Token>, String> {
     Ok(tokens)
 }
 
-fn is_symbol(token: &Token, symbol: &str) -> bool {
+pub(super) fn is_symbol(token: &Token, symbol: &str) -> bool {
     matches!(token, Token::Symbol(text) if *text == symbol)
 }
 
@@ -117,7 +127,7 @@ fn has_statements(tokens: &[Token]) -> bool {
 }
 
 /// Return the index of the closing bracket that belongs to the opening bracket `{` or `(` at `start`.
-fn closing(tokens: &[Token], start: usize) -> Result<usize, String> {
+pub(super) fn closing(tokens: &[Token], start: usize) -> Result<usize, String> {
     let (open, close) = match &tokens[start] {
         Token::Symbol("{") => ("{", "}"),
         _ => ("(", ")"),
@@ -172,6 +182,7 @@ fn template(dialect: Dialect, name: &str, arguments: usize) -> Option<&'static s
         (Dialect::PeriLab, "atan", 2) => "atan2($1, $2)",
         (Dialect::Lammps, "ln", 1) => "log($1)",
         (Dialect::Lammps, "log", 1) => "log10($1)",
+        (Dialect::Lammps, "ternary", 3) => "if($1, $2, $3)",
         (Dialect::Lammps, "vdisplace", 2) => "($1 + ($2)*t)",
         (Dialect::Lammps, "swiggle", 3) => "($1 + ($2)*sin(2*pi*t/($3)))",
         (Dialect::Lammps, "cwiggle", 3) => "($1 + ($2)*(1 - cos(2*pi*t/($3))))",
@@ -179,9 +190,10 @@ fn template(dialect: Dialect, name: &str, arguments: usize) -> Option<&'static s
     })
 }
 
-struct Rewriter<'a> {
+/// Translator of the tokens of one expression.
+pub(super) struct Rewriter<'a> {
     dialect: Dialect,
-    names: Names<'a>,
+    pub(super) names: Names<'a>,
 }
 
 impl Rewriter<'_> {
@@ -389,6 +401,9 @@ impl Rewriter<'_> {
         if depth > DEEPEST {
             return Err("the expression is too deep".to_owned());
         }
+        if self.dialect == Dialect::Lammps {
+            return self.left_to_right(tokens, depth);
+        }
         let mut text = String::new();
         let mut at = 0;
         while at < tokens.len() {
@@ -429,7 +444,12 @@ impl Rewriter<'_> {
     }
 
     /// Translate a function call. A function without a template keeps its name.
-    fn call(&self, name: &str, tokens: &[Token], depth: usize) -> Result<String, String> {
+    pub(super) fn call(
+        &self,
+        name: &str,
+        tokens: &[Token],
+        depth: usize,
+    ) -> Result<String, String> {
         let mut arguments = vec![Vec::new()];
         let mut level = 0_i64;
         for token in tokens {
@@ -530,6 +550,26 @@ mod tests {
         for (text, expected) in [
             ("ln(10) + log(100)", libm::log(10.0) + 2.0),
             ("vdisplace(1.0, -100)", 1.0 - 100.0 * t),
+            // Values of LAMMPS itself.
+            ("-2^2", 4.0),
+            ("2^3^2", 64.0),
+            ("2^-1", 0.5),
+            ("-(2)^2", 4.0),
+            ("--2", 2.0),
+            ("2*-3", -6.0),
+            ("8/4/2 - 3 - 1", -3.0),
+            ("7%4*2", 6.0),
+            ("2*7%4", 2.0),
+            ("-7%4", -3.0),
+            ("1<2==1", 1.0),
+            ("1==1==0", 0.0),
+            ("3>2>1", 0.0),
+            ("!0==0", 0.0),
+            ("!2^2", 0.0),
+            ("1|^1", 0.0),
+            ("0|^1||1", 1.0),
+            ("1||0&&0", 1.0),
+            ("ternary(1<2, 5, 6)", 5.0),
         ] {
             assert_eq!(value(text, Dialect::Lammps), expected, "{text}");
         }
@@ -551,6 +591,19 @@ mod tests {
             assert!(error.starts_with(message), "{text}: {error}");
         }
         assert!(rewritten(&"(".repeat(1000), Dialect::PeriLab).is_err());
-        assert!(rewritten(&"sin(".repeat(1000), Dialect::Lammps).is_err());
+        for text in ["sin(", "(", "-", "2^", "2*"] {
+            assert!(
+                rewritten(&text.repeat(1000), Dialect::Lammps).is_err(),
+                "{text}"
+            );
+        }
+        for (text, message) in [
+            ("1 +", "a value is missing"),
+            ("1 & 2", "unexpected `&`"),
+            ("1 2", "unexpected `2`"),
+            ("2**3", "unexpected `**`"),
+        ] {
+            assert_eq!(rewritten(text, Dialect::Lammps).unwrap_err(), message);
+        }
     }
 }

@@ -121,15 +121,30 @@ pub(super) const UNCORRECTED_SURFACE: &str = "bond forces are not multiplied by 
 pub(super) const UNDAMPED_DAMAGE: &str =
     "the motion of damaged points is not damped, so cracks may grow faster or branch";
 
+/// Log note for a script with periodic boundaries.
+pub(super) const NO_PERIODICITY: &str =
+    "there are no periodic boundaries; bodies end at the faces of the box";
+
+/// Log note for a command of LAMMPS that chooses or repeats commands.
+pub(super) const NO_CONTROL_FLOW: &str =
+    "control flow is not followed, so commands that it chooses or repeats are left out";
+
+/// Log note for a command of LAMMPS that changes atoms, materials or bonds and has no counterpart.
+pub(super) const OTHER_MODEL: &str =
+    "points, materials or bonds of the new deck differ from those of LAMMPS";
+
 /// Log notes for keys whose results in the new deck differ from those of the source deck. A warning repeats
 /// these notes with the lines of the keys.
-const CONSEQUENCES: [&str; 6] = [
+const CONSEQUENCES: [&str; 9] = [
     SHORT_CONTACT,
     DOUBLED_SHEAR,
     HALVED_SHEAR,
     SPATIAL_CONSTANTS,
     UNCORRECTED_SURFACE,
     UNDAMPED_DAMAGE,
+    NO_PERIODICITY,
+    NO_CONTROL_FLOW,
+    OTHER_MODEL,
 ];
 
 /// Peridigm's key for omitting bonds between blocks.

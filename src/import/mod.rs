@@ -17,6 +17,7 @@ pub mod log;
 mod outputs;
 mod peridigm;
 mod perilab;
+mod precedence;
 mod regions;
 mod script;
 mod sets;
@@ -69,7 +70,7 @@ pub struct Import {
     pub text: String,
     /// Outcome of each key of the source deck.
     pub entries: Vec<Entry>,
-    /// Files that the new deck reads.
+    /// Files that the new deck reads, and files that the source deck includes.
     pub files: Vec<PathBuf>,
     /// Error of the new deck or of its point and mesh files; `None` if the new deck is valid.
     pub fault: Option<Error>,
@@ -110,9 +111,11 @@ pub fn translate(source: &Source, code: Option<Code>, target: &Path) -> Result<I
         || script::is_script(&source.text),
         |code| code == Code::Lammps,
     ) {
-        let script = script::parse(&source.text);
+        let folder = source.path.parent().unwrap_or("".as_ref());
+        let script = script::parse(&source.text, folder);
         let script = script.map_err(|(line, message)| line_error(source, line, message))?;
         let mut translation = Translation::new(source, target, Dialect::Lammps);
+        translation.files.borrow_mut().extend(script.files.clone());
         lammps::translate(&mut translation, &script)?;
         return Ok(finish(
             translation,

@@ -154,6 +154,32 @@ impl Region {
         (0..3).all(|k| lower[k] <= bounds[0][k] && bounds[1][k] <= upper[k])
     }
 
+    /// Return the part of the region that is in a box. `bounds` holds the lower and the upper corner of this
+    /// box.
+    pub fn clipped(&self, bounds: [[f64; 3]; 2]) -> Self {
+        let [lower, upper] = bounds;
+        let own = self.bounds();
+        if (0..3).all(|k| lower[k] <= own[0][k] && own[1][k] <= upper[k]) {
+            return self.clone();
+        }
+        match self {
+            Self::Block(a, b) => Self::Block(
+                std::array::from_fn(|k| a[k].max(lower[k])),
+                std::array::from_fn(|k| b[k].min(upper[k])),
+            ),
+            Self::Union(parts) => {
+                Self::Union(parts.iter().map(|part| part.clipped(bounds)).collect())
+            }
+            _ => self.clone().intersection(Self::Block(lower, upper)),
+        }
+    }
+
+    /// Return a bound that excludes atoms on the upper face of a box. `face` is the coordinate of this face.
+    /// The shapes of the new deck extend beyond their regions by `MARGIN` spacings.
+    pub fn below(face: f64, spacing: f64) -> f64 {
+        face - 3.0 * MARGIN * spacing
+    }
+
     /// Replace infinite bounds of the region by the bounds of a box.
     pub fn within(&self, bounds: [[f64; 3]; 2]) -> Self {
         let clamp = |value: f64, k: usize| {

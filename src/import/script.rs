@@ -1,12 +1,14 @@
 //! Commands and variables of an input script of LAMMPS.
 
 use std::collections::HashMap;
+use std::path::{Path, PathBuf};
 
 use super::expression::{Dialect, rewrite};
 use super::tree::{Content, MOST_NODES, Mistake, Node};
+use crate::deck::Source;
 use crate::expression::{Expression, Variable};
 
-/// Maximum depth of variables that refer to other variables.
+/// Maximum depth of variables that refer to other variables, and of files that include other files.
 const DEEPEST: usize = 32;
 
 /// Maximum length of a command after substitution, bytes.
@@ -17,14 +19,25 @@ const LONGEST: usize = 1 << 16;
 pub struct Command {
     /// Words of the command, without quotes and with variables replaced.
     pub words: Vec<String>,
-    /// Node under which the log stores the outcome of the command.
+    /// Node under which the log stores the outcome of the command. For a command of an included file, the
+    /// line is that of `include` in the script.
     pub node: Node,
+    /// File and line of a command of an included file, such as `supports.in:3`.
+    origin: Option<String>,
 }
 
 impl Command {
     /// Return the name of the command.
     pub fn name(&self) -> &str {
         &self.words[0]
+    }
+
+    /// Return the name of the command, after file and line if the command is from an included file.
+    pub fn key(&self) -> String {
+        match &self.origin {
+            Some(origin) => format!("{origin}: {}", self.name()),
+            None => self.name().to_owned(),
+        }
     }
 
     /// Return the arguments of the command.
@@ -36,21 +49,44 @@ impl Command {
 /// A LAMMPS input script.
 #[derive(Debug, Default)]
 pub struct Script {
-    /// Commands in order.
+    /// Commands in order, with those of included files.
     pub commands: Vec<Command>,
+    /// Included files, relative to the working directory or absolute.
+    pub files: Vec<PathBuf>,
 }
 
-/// Time step before the first command `timestep` of a script, s. This value is the default of LAMMPS in SI
-/// units.
-const DEFAULT_STEP: f64 = 1e-8;
+/// Default time steps of LAMMPS, by the name of the units and in these units. The first units are those of a
+/// script without the command `units`.
+const DEFAULT_STEPS: [(&str, f64); 8] = [
+    ("lj", 0.005),
+    ("real", 1.0),
+    ("metal", 0.001),
+    ("si", 1e-8),
+    ("cgs", 1e-8),
+    ("electron", 0.001),
+    ("micro", 2.0),
+    ("nano", 0.00045),
+];
 
 /// Values that the variables and the time step have at one command of a script.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Variables {
     /// Formula or value of each variable, by the name of the variable.
     values: HashMap<String, String>,
-    /// Time step that the last command `timestep` has set, s.
-    pub step: Option<f64>,
+    /// Time step that the last command `timestep` has set, or the default of the units.
+    pub step: f64,
+    /// Whether a command `timestep` has set the time step.
+    pub has_step: bool,
+}
+
+impl Default for Variables {
+    fn default() -> Self {
+        Self {
+            values: HashMap::new(),
+            step: DEFAULT_STEPS[0].1,
+            has_step: false,
+        }
+    }
 }
 
 /// Test whether a text is a LAMMPS script with peridynamics.
@@ -62,32 +98,30 @@ pub fn is_script(text: &str) -> bool {
 }
 
 /// Split a script into commands. In each command, replace the variables and formulas after a `$` by the
-/// values that they have at this command.
+/// values that they have at this command. Add the commands of included files, whose paths are relative to
+/// `folder`.
 ///
 /// # Errors
+/// - If an included file cannot be read, or included files are too deep.
 /// - If a quote or bracket is not closed.
 /// - If a variable is not defined.
 /// - If a formula in `$(…)` is invalid or changes with time.
 /// - If a time step is not a number.
 /// - If the script or a line is too long.
-pub fn parse(text: &str) -> Result<Script, Mistake> {
+pub fn parse(text: &str, folder: &Path) -> Result<Script, Mistake> {
     let mut script = Script::default();
-    let mut variables = Variables::default();
-    let mut pending: Option<(usize, String)> = None;
-    for (line, row) in (1..).zip(text.lines()) {
-        let row = without_comment(row);
-        let (start, mut joined) = pending.take().unwrap_or((line, String::new()));
-        joined.push_str(row.trim_end());
-        if let Some(continued) = joined.strip_suffix('&') {
-            pending = Some((start, format!("{continued} ")));
-            continue;
-        }
-        script.command(&mut variables, start, &joined)?;
-    }
-    if let Some((start, joined)) = pending {
-        script.command(&mut variables, start, &joined)?;
-    }
+    script.read(&mut Variables::default(), text, folder, None)?;
     Ok(script)
+}
+
+/// An included file.
+struct Included<'f> {
+    /// Name of the file, as in the command `include`.
+    name: &'f str,
+    /// Line in the script of the command that includes the file, or the file that includes this file.
+    line: usize,
+    /// Number of files that are being read.
+    depth: usize,
 }
 
 /// Return a line without its comment, which begins with `#` outside quotes.
@@ -137,12 +171,68 @@ fn words(text: &str) -> Result<Vec<String>, String> {
 }
 
 impl Script {
+    /// Add the commands of a text. `included` is the included file that has this text, `None` for the script
+    /// itself. `Err` holds the line in this text.
+    fn read(
+        &mut self,
+        variables: &mut Variables,
+        text: &str,
+        folder: &Path,
+        included: Option<&Included>,
+    ) -> Result<(), Mistake> {
+        let mut pending: Option<(usize, String)> = None;
+        for (line, row) in (1..).zip(text.lines()) {
+            let row = without_comment(row);
+            let (start, mut joined) = pending.take().unwrap_or((line, String::new()));
+            joined.push_str(row.trim_end());
+            if let Some(continued) = joined.strip_suffix('&') {
+                pending = Some((start, format!("{continued} ")));
+                continue;
+            }
+            self.command(variables, start, &joined, folder, included)?;
+        }
+        match pending {
+            Some((start, joined)) => self.command(variables, start, &joined, folder, included),
+            None => Ok(()),
+        }
+    }
+
+    /// Add the commands of the file that the command `include` on a line of a text names.
+    fn include(
+        &mut self,
+        variables: &mut Variables,
+        line: usize,
+        name: &str,
+        folder: &Path,
+        included: Option<&Included>,
+    ) -> Result<(), Mistake> {
+        let mistake = |message: String| (line, message);
+        let depth = 1 + included.map_or(0, |included| included.depth);
+        if depth > DEEPEST {
+            let message = format!("include: files are included more than {DEEPEST} deep");
+            return Err(mistake(message));
+        }
+        let path = folder.join(name);
+        let source = Source::read(&path);
+        let source = source.map_err(|error| mistake(format!("include: {}", error.message)))?;
+        self.files.push(path);
+        let inner = Included {
+            name,
+            line: included.map_or(line, |included| included.line),
+            depth,
+        };
+        self.read(variables, &source.text, folder, Some(&inner))
+            .map_err(|(line, message)| mistake(format!("{name}:{line}: {message}")))
+    }
+
     /// Add the command of a line; a blank line adds none.
     fn command(
         &mut self,
         variables: &mut Variables,
         line: usize,
         text: &str,
+        folder: &Path,
+        included: Option<&Included>,
     ) -> Result<(), Mistake> {
         let mistake = |message: String| (line, message);
         let text = variables.substitute(text).map_err(mistake)?;
@@ -156,13 +246,23 @@ impl Script {
         // The node holds the arguments only: the name of the command becomes the key of the node in the tree.
         let node = Node {
             id: self.commands.len() + 1,
-            line,
+            line: included.map_or(line, |included| included.line),
             content: Content::Text(words[1..].join(" ")),
         };
-        let command = Command { words, node };
+        let origin = included.map(|included| format!("{}:{line}", included.name));
+        let command = Command {
+            words,
+            node,
+            origin,
+        };
         variables.read(&command).map_err(mistake)?;
-        self.commands.push(command);
-        Ok(())
+        self.commands.push(command.clone());
+        match &command.words[..] {
+            [name, file] if name == "include" => {
+                self.include(variables, line, file, folder, included)
+            }
+            _ => Ok(()),
+        }
     }
 }
 
@@ -174,7 +274,16 @@ impl Variables {
     pub fn read(&mut self, command: &Command) -> Result<(), String> {
         let words = &command.words;
         match (command.name(), words.len()) {
-            ("timestep", 2) => self.step = Some(self.number(&words[1])?),
+            ("units", 2) => {
+                let mut units = DEFAULT_STEPS.iter();
+                if let Some((_, step)) = units.find(|(name, _)| *name == words[1]) {
+                    self.step = *step;
+                }
+            }
+            ("timestep", 2) => {
+                self.step = self.number(&words[1])?;
+                self.has_step = true;
+            }
             ("variable", 4..) => {
                 let style = words[2].as_str();
                 let value = match style {
@@ -260,7 +369,7 @@ impl Variables {
         if formula.trim().parse::<f64>().is_ok() {
             return Ok(formula.trim().to_owned());
         }
-        let text = self.formula(formula, self.step.unwrap_or(DEFAULT_STEP), 0)?;
+        let text = self.formula(formula, 0)?;
         let expression = Expression::of(&text).map_err(|error| error.message)?;
         let value = expression.as_constant();
         let value = value.ok_or_else(|| format!("`{formula}` changes with time"))?;
@@ -297,20 +406,15 @@ impl Variables {
         };
         let formula = self.values.get(name);
         let formula = formula.ok_or_else(|| format!("the variable `{name}` is not defined"))?;
-        let step = self.step.ok_or("the script has no `timestep`")?;
-        self.formula(formula, step, 0)
+        self.formula(formula, 0)
     }
 
     /// Translate a formula to an expression of time.
-    fn formula(&self, formula: &str, step: f64, depth: usize) -> Result<String, String> {
+    fn formula(&self, formula: &str, depth: usize) -> Result<String, String> {
         if depth > DEEPEST {
             return Err("the variables are too deep, or use themselves".to_owned());
         }
-        let mut text: String = formula.chars().filter(|c| !c.is_whitespace()).collect();
-        for elapsed in ["step", "elapsed", "elaplong"] {
-            text = text.replace(&format!("{elapsed}*dt"), "time");
-            text = text.replace(&format!("dt*{elapsed}"), "time");
-        }
+        let step = self.step;
         let failed = std::cell::RefCell::new(None);
         let names = |name: &str| match name {
             "PI" => Some("pi".to_owned()),
@@ -319,7 +423,7 @@ impl Variables {
             "step" | "elapsed" | "elaplong" => Some(format!("(t/{step:?})")),
             name => {
                 let known = self.values.get(name.strip_prefix("v_")?)?;
-                match self.formula(known, step, depth + 1) {
+                match self.formula(known, depth + 1) {
                     Ok(text) => Some(match text.parse::<f64>() {
                         Ok(value) if value >= 0.0 => text,
                         _ => format!("({text})"),
@@ -331,7 +435,7 @@ impl Variables {
                 }
             }
         };
-        let result = rewrite(&text, Dialect::Lammps, &names, &[Variable::T]);
+        let result = rewrite(formula, Dialect::Lammps, &names, &[Variable::T]);
         match failed.into_inner() {
             Some(message) => Err(message),
             None => result,
@@ -358,7 +462,7 @@ mod tests {
                     fix 1 all indent 1e17 sphere 0 &\n  ${a} $n v_y # to here\n\
                     timestep 1e-7\nvariable y0 equal 0.5\nvariable y equal \"v_y0 - step*dt*100\"\n\
                     fix 2 all print 9 \"$(step)\"\nrun $(10*v_n)\n";
-        let script = parse(text).unwrap();
+        let script = parse(text, "".as_ref()).unwrap();
         let names: Vec<&str> = script.commands.iter().map(Command::name).collect();
         assert_eq!(
             names,
@@ -373,7 +477,15 @@ mod tests {
         let variables = behind(&script);
         assert_eq!(variables.of_time("v_y").unwrap(), "0.5-t*100");
         assert_eq!(script.commands[8].words[1], "70.0");
-        assert_eq!(variables.step, Some(1e-7));
+        // `step*dt` is the time only if no other operator binds tighter.
+        for (formula, expected) in [
+            ("dt * elapsed", "t"),
+            ("1-step*dt^2", "1-(t/1e-7)*1e-7^2"),
+            ("1/step*dt", "1/(t/1e-7)*1e-7"),
+        ] {
+            assert_eq!(variables.formula(formula, 0).unwrap(), expected);
+        }
+        assert_eq!(variables.step, 1e-7);
     }
 
     #[test]
@@ -386,7 +498,7 @@ mod tests {
             ),
             ("print \"\" 'a # b' # c", &["print", "", "a # b"]),
         ] {
-            let script = parse(text).unwrap();
+            let script = parse(text, "".as_ref()).unwrap();
             assert_eq!(script.commands[0].words, expected, "{text}");
         }
     }
@@ -401,13 +513,13 @@ mod tests {
             ("print \"\"\"a\" b\"\n", 1, "a quote is not closed"),
         ] {
             assert_eq!(
-                parse(text).unwrap_err(),
+                parse(text, "".as_ref()).unwrap_err(),
                 (line, message.to_owned()),
                 "{text}"
             );
         }
         let text = "timestep 1\nvariable a equal v_b\nvariable b equal v_a\n";
-        let variables = behind(&parse(text).unwrap());
+        let variables = behind(&parse(text, "".as_ref()).unwrap());
         let message = "the variables are too deep, or use themselves";
         assert_eq!(variables.of_time("v_a"), Err(message.to_owned()));
     }

@@ -1,6 +1,7 @@
 //! Fixes of LAMMPS: loads, supports, damping, indenters.
 
-use super::groups::{NO_SET, set, set_in_region};
+use super::groups::{NO_SET, named_region, set, set_in_region};
+use super::velocities::velocities;
 use super::{Model, wrong};
 use crate::error::{Result, excerpt};
 use crate::import::draft::{Section, Value};
@@ -12,9 +13,9 @@ use crate::import::translation::Translation;
 /// Name of the rigid body of an indenter.
 const INDENTER: &str = "indenter";
 
-/// Fix styles that are loads or supports. An entry is the part of a style before the first `/`. For example,
-/// `wall` stands for `wall/reflect`.
-const LOADS: [&str; 18] = [
+/// Fix styles that are loads or supports, or change velocities. An entry is the part of a style before the
+/// first `/`. For example, `wall` stands for `wall/reflect`.
+const LOADS: [&str; 28] = [
     "addforce",
     "addtorque",
     "aveforce",
@@ -25,13 +26,23 @@ const LOADS: [&str; 18] = [
     "freeze",
     "gravity",
     "indent",
+    "langevin",
     "lineforce",
+    "momentum",
     "move",
+    "nph",
+    "npt",
+    "nvk",
+    "nvt",
     "planeforce",
+    "press",
+    "recenter",
     "rigid",
     "setforce",
     "smd",
     "spring",
+    "temp",
+    "viscous",
     "wall",
 ];
 
@@ -126,6 +137,7 @@ pub(super) fn fix(
                     let text = variables.of_time(word)?;
                     match text.parse::<f64>() {
                         Ok(value) => Value::number(factor * value),
+                        Err(_) if factor == 1.0 => Value::text(text),
                         Err(_) => Value::text(format!("{factor:?}*({text})")),
                     }
                 }
@@ -133,7 +145,6 @@ pub(super) fn fix(
         }
         Ok(vector)
     };
-    let volume = spacing.powi(3);
     let name = format!("fix {id}");
     let Some((count, keywords)) = form(style, rest.first().copied()) else {
         let note = format!("fix {style} has no counterpart");
@@ -173,24 +184,27 @@ pub(super) fn fix(
                 translation.leave_out_load(node, "condition", &name, note);
                 return Ok(());
             }
-            let velocity = model
-                .velocities
-                .iter()
-                .rev()
-                .find(|velocity| velocity.group == *group || velocity.group == "all");
-            let velocity = velocity.map_or([None; 3], |velocity| velocity.components);
-            let component = |k: usize| {
-                if is_null(k) {
-                    Value::text("free")
-                } else {
-                    Value::number(velocity[k].unwrap_or(0.0))
-                }
+            let region = setting("region").and_then(|region| named_region(model, region));
+            let found = velocities(model, group, region.as_ref());
+            let component = |k: usize| match found {
+                _ if is_null(k) => Ok(Value::text("free")),
+                Ok(velocity) => velocity[k]
+                    .map(Value::number)
+                    .ok_or("its points start with different velocities"),
+                Err(note) => Err(note),
             };
-            Some((
-                "velocity",
-                (0..3).map(component).collect(),
-                "the velocity that points start with",
-            ))
+            let components: std::result::Result<Vec<Value>, &str> = (0..3).map(component).collect();
+            match components {
+                Ok(components) => Some((
+                    "velocity",
+                    components,
+                    "the velocity that points start with",
+                )),
+                Err(note) => {
+                    translation.leave_out_load(node, "condition", &name, note);
+                    return Ok(());
+                }
+            }
         }
         ("move", Some("linear")) => Some((
             "velocity",
@@ -231,7 +245,8 @@ pub(super) fn fix(
             })
         }
         ("addforce", _) => {
-            let force = vector(rest, 1.0 / volume).map_err(|m| wrong(translation, command, m))?;
+            // A force of `atom_style peri` is a force density: LAMMPS divides it by the density.
+            let force = vector(rest, 1.0).map_err(|m| wrong(translation, command, m))?;
             let zero = |value: Value| {
                 if value == Value::text("free") {
                     Value::Number("0".to_owned())
@@ -242,7 +257,7 @@ pub(super) fn fix(
             Some((
                 "body_force",
                 force.into_iter().map(zero).collect(),
-                "body_force: force over the volume of a point",
+                "body_force",
             ))
         }
         _ => None,
@@ -426,7 +441,7 @@ fn indent(
     }
     translation.add(section);
     let note = format!(
-        "[rigid.{written}]: a layer of the points' material in place of the force K (r − R)² on each atom"
+        "[rigid.{written}]: a layer of the points' material in place of the force density K (r − R)² at each atom"
     );
     translation.log.note(node, Fate::Approximated, note);
     if arguments[1] != "all" {

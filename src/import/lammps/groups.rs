@@ -11,16 +11,18 @@ const MOST_SITES: usize = 10_000_000;
 /// Reason for leaving out a command whose group has no counterpart in the new deck.
 pub(super) const NO_SET: &str = "its group is no body or region";
 
-/// Atoms that a group selects: all atoms, the atoms of a type, or the atoms in a named region.
+/// Atoms that a group selects: all atoms, the atoms of a type, the atoms in a named region, or another
+/// selection, which has no counterpart.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Group {
     All,
     Type(u32),
     Region(String),
+    Other,
 }
 
 /// Return the selection of a group by its name; `None` for an unknown group.
-fn find(model: &Model, name: &str) -> Option<Group> {
+pub(super) fn find(model: &Model, name: &str) -> Option<Group> {
     if name == "all" {
         return Some(Group::All);
     }
@@ -31,7 +33,7 @@ fn find(model: &Model, name: &str) -> Option<Group> {
 
 /// Return a region by its name, with bounds of the box in place of infinite bounds. Return `None` if no
 /// region with this name has been translated.
-fn named_region(model: &Model, name: &str) -> Option<Region> {
+pub(super) fn named_region(model: &Model, name: &str) -> Option<Region> {
     let mut regions = model.regions.iter();
     let (_, region, _) = regions.find(|(other, ..)| other == name)?;
     let region = region.clone();
@@ -48,6 +50,7 @@ pub(super) fn region_of(model: &Model, name: &str) -> Option<Region> {
         Group::All => None,
         Group::Type(kind) => Some(kind),
         Group::Region(region) => return named_region(model, &region),
+        Group::Other => return None,
     };
     let is_in = |of: u32| kind.is_none_or(|kind| kind == of);
     let atoms = model.atoms.iter().filter(|atoms| is_in(atoms.kind));
@@ -85,6 +88,7 @@ pub(super) fn set(
             };
             Some(write_set(translation, model, &wanted, &region))
         }
+        Group::Other => None,
     }
 }
 
@@ -128,10 +132,20 @@ pub(super) fn write_set(
     written
 }
 
-/// Test whether a region contains an atom at the start of the run. If the region has more than `MOST_SITES`
-/// lattice sites, test only every n-th site in each direction. If none of the tested sites of such a region
-/// has an atom, return `None`, because the other sites are not tested.
+/// Test whether a region contains an atom at the start of the run. Return `None` if the lattice is too large
+/// to know it.
 pub(super) fn has_atoms(model: &Model, region: &Region) -> Option<bool> {
+    let (mut atoms, is_complete) = atoms_in(model, region);
+    let is_found = atoms.next().is_some();
+    (is_found || is_complete).then_some(is_found)
+}
+
+/// Return the positions of the atoms in a region at the start of the run, and whether these are all atoms. If
+/// the region has more than `MOST_SITES` lattice sites, test only every n-th site in each direction.
+pub(super) fn atoms_in<'m>(
+    model: &'m Model,
+    region: &'m Region,
+) -> (impl Iterator<Item = [f64; 3]> + 'm, bool) {
     let spacing = model.spacing.unwrap_or(1.0);
     let bounds = region.bounds();
     let index = |corner: usize, k: usize| bounds[corner][k] / spacing - model.origin[k];
@@ -139,19 +153,18 @@ pub(super) fn has_atoms(model: &Model, region: &Region) -> Option<bool> {
     let last = [0, 1, 2].map(|k| index(1, k).ceil());
     let count: f64 = (0..3).map(|k| last[k] - first[k] + 1.0).product();
     let step = (count / MOST_SITES as f64).cbrt().ceil().max(1.0) as usize;
-    let sites = |k: usize| {
+    let sites = move |k: usize| {
         let site = move |n: i64| (n as f64 + model.origin[k]) * spacing;
         let range = first[k] as i64..=last[k] as i64;
         range.step_by(step).map(site)
     };
-    let is_atom = |point: [f64; 3]| {
+    let is_atom = move |point: &[f64; 3]| {
         let mut atoms = model.atoms.iter();
-        region.contains(point, spacing) && atoms.any(|atoms| atoms.region.contains(point, spacing))
+        let is_in = |region: &Region| region.contains(*point, spacing);
+        is_in(region) && atoms.any(|atoms| is_in(&atoms.region))
     };
-    let planes = sites(0).flat_map(|x| sites(1).map(move |y| (x, y)));
-    let all = planes.flat_map(|(x, y)| sites(2).map(move |z| [x, y, z]));
-    if all.take(MOST_SITES).any(is_atom) {
-        return Some(true);
-    }
-    (count <= MOST_SITES as f64).then_some(false)
+    let planes = sites(0).flat_map(move |x| sites(1).map(move |y| (x, y)));
+    let all = planes.flat_map(move |(x, y)| sites(2).map(move |z| [x, y, z]));
+    let atoms = all.take(MOST_SITES).filter(is_atom);
+    (atoms, count <= MOST_SITES as f64)
 }

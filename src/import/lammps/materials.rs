@@ -5,6 +5,7 @@ use crate::error::{Result, excerpt};
 use crate::import::bodies::{self, Body, Criterion, DamageModel, Material};
 use crate::import::draft::{Section, Value};
 use crate::import::elastic::Constants;
+use crate::import::log::{Fate, OTHER_MODEL};
 use crate::import::translation::Translation;
 use crate::import::tree::Node;
 use std::f64::consts::PI;
@@ -16,12 +17,65 @@ pub(super) struct Coefficients {
     pub(super) node: Node,
 }
 
-/// Return the last coefficients that the script gives for bonds between atoms of the type `kind`.
-fn coefficients(model: &Model, kind: u32) -> Option<&Coefficients> {
-    let fits = |of: u32| of == 0 || of == kind;
-    let found = model.coefficients.iter().rev();
-    let mut found = found.filter(|c| fits(c.types[0]) && fits(c.types[1]));
-    found.next()
+/// Return the last coefficients that the script gives for bonds between atoms of the types `a` and `b`.
+fn coefficients(model: &Model, a: u32, b: u32) -> Option<&Coefficients> {
+    let fits = |of: u32, kind: u32| of == 0 || of == kind;
+    let mut found = model.coefficients.iter().rev();
+    found.find(|Coefficients { types: [i, j], .. }| {
+        (fits(*i, a) && fits(*j, b)) || (fits(*i, b) && fits(*j, a))
+    })
+}
+
+/// Return the index of the horizon in the coefficients of a law; the moduli come before it.
+fn horizon_index(law: &str) -> usize {
+    if law == "pmb" { 1 } else { 2 }
+}
+
+/// Log the coefficients of bonds between atoms of different types. In the new deck, such a bond has the mean
+/// moduli of its ends and the smaller critical stretch.
+fn note_joints(translation: &Translation, model: &Model, kinds: &[u32], law: &str) {
+    let first = horizon_index(law);
+    let pairs = kinds
+        .iter()
+        .flat_map(|a| kinds.iter().map(move |b| (*a, *b)));
+    for (a, b) in pairs.filter(|(a, b)| a < b) {
+        let of = |a, b| coefficients(model, a, b);
+        let (Some(joint), Some(one), Some(other)) = (of(a, b), of(a, a), of(b, b)) else {
+            continue;
+        };
+        if joint.node.id == one.node.id && one.node.id == other.node.id {
+            continue;
+        }
+        let expected = |k: usize| {
+            let [x, y] = [one.values[k], other.values[k]];
+            match k {
+                k if k < first => f64::midpoint(x, y),
+                k if k == first + 1 => x.min(y),
+                _ => x,
+            }
+        };
+        let is_equal = |k: usize| {
+            let tolerance = 1e-6 * expected(k).abs();
+            (joint.values[k] - expected(k)).abs() <= tolerance
+        };
+        let is_same = joint.values.len() == one.values.len()
+            && (0..one.values.len()).all(is_equal)
+            && (first..one.values.len())
+                .all(|k| k == first + 1 || one.values[k] == other.values[k]);
+        let log = &translation.log;
+        let note = "bonds between bodies have the mean moduli of their ends and the smaller critical stretch";
+        if is_same {
+            log.taken(&joint.node, note);
+        } else {
+            let fate = if joint.types[0] == joint.types[1] {
+                Fate::Approximated
+            } else {
+                Fate::LeftOut
+            };
+            log.note(&joint.node, fate, note);
+            log.note(&joint.node, fate, OTHER_MODEL);
+        }
+    }
 }
 
 /// Write materials, damage and bodies. Return for each body its atom type, the name of its region and its
@@ -65,7 +119,7 @@ pub(super) fn write_bodies(
     let mut materials: Vec<(u32, Material, Option<String>, Value)> = Vec::new();
     for atoms in &model.atoms {
         if !materials.iter().any(|(kind, ..)| *kind == atoms.kind) {
-            let made = write_material(translation, model, atoms.kind, law, spacing)?;
+            let made = write_material(translation, model, atoms.kind, law)?;
             materials.push((atoms.kind, made.0, made.1, made.2));
         }
         let made = materials.iter().find(|(kind, ..)| *kind == atoms.kind);
@@ -84,14 +138,8 @@ pub(super) fn write_bodies(
         });
         names.push((atoms.kind, atoms.name.clone(), body));
     }
-    for coefficients in &model.coefficients {
-        let [a, b] = coefficients.types;
-        if a != b && a != 0 && b != 0 {
-            let note =
-                "bonds between bodies have the constants of their ends and the weaker toughness";
-            translation.log.left_out(&coefficients.node, note);
-        }
-    }
+    let kinds: Vec<u32> = materials.iter().map(|(kind, ..)| *kind).collect();
+    note_joints(translation, model, &kinds, law);
     bodies::write(translation, &bodies);
     let contact = translation.draft.section("contact");
     contact.set("model", Value::text("short-range"));
@@ -113,9 +161,8 @@ fn write_material(
     model: &Model,
     kind: u32,
     law: &'static str,
-    spacing: f64,
 ) -> Result<(Material, Option<String>, Value)> {
-    let Some(coefficients) = coefficients(model, kind) else {
+    let Some(coefficients) = coefficients(model, kind, kind) else {
         let message = format!("there is no `pair_coeff` for type {kind}");
         return Err(translation.error(1, message));
     };
@@ -141,7 +188,7 @@ fn write_material(
         let message = format!("there is no `set … density` for type {kind}");
         return Err(translation.error(1, message));
     };
-    let first = if law == "pmb" { 1 } else { 2 };
+    let first = horizon_index(law);
     let [horizon, stretch, alpha] = [values[first], values[first + 1], values[first + 2]];
     let written = translation.name("material", &format!("type {kind}"));
     let mut section = Section::new(format!("material.{written}.{law}"));
@@ -178,7 +225,7 @@ fn write_material(
         _ => {}
     }
     if let Some(drag) = model.drag {
-        section.set("damping", Value::number(drag / (density * spacing.powi(3))));
+        section.set("damping", Value::number(drag / density));
     }
     translation.add(section);
     let note = format!("[material.{written}.{law}] and the horizon");

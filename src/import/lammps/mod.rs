@@ -6,18 +6,22 @@ mod integration;
 mod materials;
 mod run;
 mod setup;
+mod types;
+mod velocities;
 
 use crate::error::Result;
 use crate::import::regions::Region;
 use crate::import::script::{Command, Script, Variables};
 use crate::import::translation::Translation;
 use crate::import::tree::{Content, Node};
+use fixes::{is_load, without_suffix};
 use groups::Group;
 use integration::hold;
 use materials::{Coefficients, write_bodies};
 use run::{Run, follow, simulate};
 use setup::{UNITS_LJ, setup};
 use std::collections::HashMap;
+use velocities::Velocity;
 
 /// Atoms that one command creates.
 struct Atoms {
@@ -25,16 +29,6 @@ struct Atoms {
     region: Region,
     /// Name of the region.
     name: String,
-}
-
-/// Velocity that one command sets.
-struct Velocity {
-    /// Node id of the command.
-    node: usize,
-    group: String,
-    /// Velocity components. A component that this command does not set comes from earlier commands for the
-    /// same group or for all atoms. `None` if none of these commands sets the component.
-    components: [Option<f64>; 3],
 }
 
 /// Data of the atoms, collected from the script before the new deck is written.
@@ -45,6 +39,8 @@ struct Model {
     spacing: Option<f64>,
     origin: [f64; 3],
     regions: Vec<(String, Region, Node)>,
+    /// For each direction, whether atoms are created on the upper face of the box; `None` without `boundary`.
+    has_upper_face: Option<[bool; 3]>,
     bounds: Option<[[f64; 3]; 2]>,
     types: u32,
     atoms: Vec<Atoms>,
@@ -54,17 +50,17 @@ struct Model {
     densities: Vec<(Option<u32>, f64)>,
     /// Groups: name, selection and node.
     groups: Vec<(String, Group, Node)>,
-    /// Damping of all atoms: force divided by velocity, N s/m.
+    /// Damping of all atoms: force density divided by velocity, N s/m⁴.
     drag: Option<f64>,
-    /// Velocities of groups in the order of the commands.
+    /// Commands `velocity … set` in their order.
     velocities: Vec<Velocity>,
     fields: Vec<&'static str>,
 }
 
-/// Return the tree of a script. The keys of the tree are the names of the commands.
+/// Return the tree of a script. The keys of the tree are those of the commands.
 pub fn tree(script: &Script) -> Node {
     let commands = script.commands.iter();
-    let entries = commands.map(|command| (command.name().to_owned(), command.node.clone()));
+    let entries = commands.map(|command| (command.key(), command.node.clone()));
     Node {
         id: 0,
         line: 1,
@@ -122,11 +118,20 @@ pub fn translate(translation: &mut Translation, script: &Script) -> Result<()> {
         }
     }
     hold(translation, &model, &fixes, after.first());
+    let loads: Vec<&str> = fixes.iter().filter_map(|fix| load_id(fix)).collect();
     for command in after {
         read(translation, &mut variables, command)?;
-        follow(translation, &variables, &mut run, command)?;
+        follow(translation, &variables, &mut run, &loads, command)?;
     }
     run.write(translation, &model)
+}
+
+/// Return the id of a fix that is a load or a support; `None` for other fixes.
+fn load_id(fix: &Command) -> Option<&str> {
+    match &fix.arguments()[..] {
+        [id, _, style, ..] if is_load(without_suffix(style)) => Some(*id),
+        _ => None,
+    }
 }
 
 /// Return the node ids of the commands that have no effect in the first run, with the reason. `commands` are
@@ -173,6 +178,6 @@ fn wrong(
     command: &Command,
     message: impl AsRef<str>,
 ) -> crate::error::Error {
-    let message = format!("{}: {}", command.name(), message.as_ref());
+    let message = format!("{}: {}", command.key(), message.as_ref());
     translation.error(command.node.line, message)
 }

@@ -1,11 +1,11 @@
 //! Runs of LAMMPS: their time steps, outputs and initial velocities.
 
 use super::fixes::{fix, is_load, without_suffix};
-use super::groups::{NO_SET, set};
-use super::setup::{ignored, initial_value};
-use super::{Model, NO_STEP, Velocity, makes_no_step, wrong};
+use super::setup::{CHANGES, ignored, initial_value};
+use super::{Model, NO_STEP, makes_no_step, velocities, wrong};
 use crate::error::Result;
 use crate::import::draft::Value;
+use crate::import::log::OTHER_MODEL;
 use crate::import::script::{Command, Variables};
 use crate::import::translation::Translation;
 
@@ -108,11 +108,12 @@ fn reset(
 }
 
 /// Read the first `run` command, or a command after it. Commands after the first `run` matter only if they
-/// change the end of the run.
+/// change the end of the run. `loads` are the ids of the loads and supports in the first run.
 pub(super) fn follow(
     translation: &mut Translation,
     variables: &Variables,
     run: &mut Run,
+    loads: &[&str],
     command: &Command,
 ) -> Result<()> {
     let node = &command.node;
@@ -120,8 +121,10 @@ pub(super) fn follow(
         "run" if makes_no_step(command) => translation.log.left_out(node, NO_STEP),
         "run" => {
             let fail = |message: &str| wrong(translation, command, message);
-            let step = variables.step.filter(|step| *step > 0.0);
-            let step = step.ok_or_else(|| fail("there is no `timestep` above 0 before it"))?;
+            let step = variables.step;
+            if step <= 0.0 {
+                return Err(fail("there is no `timestep` above 0 before it"));
+            }
             let is_end = command.arguments().contains(&"upto");
             let least = if is_end { 0.0 } else { 1.0 };
             let given = steps(translation, variables, command, 0, least)?;
@@ -137,9 +140,15 @@ pub(super) fn follow(
                 _ => run.runs.push((count, step)),
             }
             translation.log.taken(node, "[time] end");
+            if !variables.has_step {
+                let note = format!(
+                    "without `timestep`, the time step is the default of the units, {step:e}"
+                );
+                translation.log.taken(node, note);
+            }
         }
         "timestep" => match run.runs.first() {
-            Some((_, first)) if variables.step != Some(*first) => translation.log.approximated(
+            Some((_, first)) if variables.step != *first => translation.log.approximated(
                 node,
                 "each later `run` adds its number of steps times this step to [time] end; [time] step is that of the first `run`",
             ),
@@ -147,8 +156,9 @@ pub(super) fn follow(
         },
         "reset_timestep" => reset(translation, variables, run, command)?,
         "variable" => translation.log.taken(node, "its value where it is used"),
+        "include" => translation.log.taken(node, "its commands are read"),
         name => {
-            let reason = ignored(name);
+            let reason = ignored(command);
             let reason = reason.unwrap_or("changes after the first `run` are not followed");
             let arguments = command.arguments();
             let style = arguments.get(2).map_or("", |style| without_suffix(style));
@@ -157,11 +167,18 @@ pub(super) fn follow(
                     let name = format!("fix {}", arguments[0]);
                     translation.leave_out_load(node, "condition", &name, reason);
                 }
-                "velocity" | "displace_atoms" => {
+                "unfix" if loads.contains(&arguments[0]) => {
+                    translation.leave_out_load(node, "condition", name, reason);
+                }
+                "velocity" | "displace_atoms" | "minimize" => {
                     translation.leave_out_load(node, "initial", name, reason);
                 }
                 "set" if initial_value(command).is_some() => {
                     translation.leave_out_load(node, "initial", name, reason);
+                }
+                name if CHANGES.contains(&name) => {
+                    translation.log.left_out(node, reason);
+                    translation.log.left_out(node, OTHER_MODEL);
                 }
                 _ => translation.log.left_out(node, reason),
             }
@@ -216,7 +233,7 @@ pub(super) fn simulate(
                 }
             }
         }
-        "velocity" => initial(translation, model, bodies, command),
+        "velocity" => velocities::write(translation, model, bodies, command),
         "displace_atoms" => {
             let note = "points start on the lattice";
             translation.leave_out_load(node, "initial", "displace_atoms", note);
@@ -227,50 +244,12 @@ pub(super) fn simulate(
             .log
             .left_out(node, "fields that a `compute` adds stay"),
         "minimize" => {
-            translation.log.left_out(
-                node,
-                "there is no minimization; relaxation finds equilibria",
-            );
+            let note = "there is no minimization; relaxation finds equilibria";
+            translation.leave_out_load(node, "initial", "minimize", note);
         }
         _ => {}
     }
     Ok(())
-}
-
-/// Write the initial velocity that a command sets.
-fn initial(
-    translation: &mut Translation,
-    model: &Model,
-    bodies: &[(u32, String, String)],
-    command: &Command,
-) {
-    let arguments = command.arguments();
-    let name = arguments.first().copied().unwrap_or("");
-    let mut velocities = model.velocities.iter();
-    let Some(at) = velocities.position(|velocity| velocity.node == command.node.id) else {
-        let note = "velocities are set by components only";
-        translation.leave_out_load(&command.node, "initial", "velocity", note);
-        return;
-    };
-    let components = |velocity: &Velocity| velocity.components.map(|v| v.unwrap_or(0.0));
-    let is_zero = |velocity: &Velocity| components(velocity) == [0.0; 3];
-    if model.velocities[..=at].iter().all(is_zero) {
-        translation.log.taken(&command.node, "points start at rest");
-        return;
-    }
-    let Some(set) = set(translation, model, bodies, name) else {
-        translation.leave_out_load(&command.node, "initial", "velocity", NO_SET);
-        return;
-    };
-    let written = translation.new_name("initial", &set);
-    let components = components(&model.velocities[at]);
-    let section = translation.draft.section(&format!("initial.{written}"));
-    section
-        .set("set", Value::text(set))
-        .set("velocity", Value::numbers(&components));
-    translation
-        .log
-        .taken(&command.node, format!("[initial.{written}] velocity"));
 }
 
 impl Run {

@@ -1,11 +1,13 @@
 //! Commands that come before the first run and define atoms and their properties.
 
 use super::fixes::without_suffix;
-use super::groups::Group;
+use super::groups::{Group, find, region_of};
 use super::materials::Coefficients;
 use super::run::WORKINGS;
-use super::{Atoms, Model, Velocity, wrong};
+use super::types::retype;
+use super::{Atoms, Model, velocities, wrong};
 use crate::error::{Result, excerpt};
+use crate::import::log::{NO_CONTROL_FLOW, NO_PERIODICITY, OTHER_MODEL};
 use crate::import::regions::{Region, region};
 use crate::import::script::{Command, Variables};
 use crate::import::translation::Translation;
@@ -16,6 +18,21 @@ pub(super) const UNITS_LJ: &str = "the scale of a lattice is a density in the un
 
 /// Keys of `set` that move atoms or set their velocity.
 const INITIAL_VALUES: [&str; 6] = ["x", "y", "z", "vx", "vy", "vz"];
+
+/// Commands that change atoms, materials or bonds. The import reads some of them, but none after the first
+/// `run`.
+pub(super) const CHANGES: [&str; 10] = [
+    "change_box",
+    "create_atoms",
+    "create_bonds",
+    "delete_atoms",
+    "delete_bonds",
+    "displace_box",
+    "pair_coeff",
+    "pair_style",
+    "replicate",
+    "set",
+];
 
 /// Read a command that defines atoms or their properties.
 pub(super) fn setup(
@@ -33,6 +50,10 @@ pub(super) fn setup(
         arguments.get(k).copied().ok_or_else(missing)
     };
     let number = |k: usize| variables.number(argument(k)?).map_err(fail);
+    let lose_model = |reason: String| {
+        log.left_out(node, reason);
+        log.left_out(node, OTHER_MODEL);
+    };
     match command.name() {
         "units" => {
             match argument(0)? {
@@ -56,14 +77,14 @@ pub(super) fn setup(
             _ => log.approximated(node, "the problem becomes one in space"),
         },
         "boundary" => {
-            if arguments.iter().any(|word| word.contains('p')) {
-                log.left_out(
-                    node,
-                    "there are no periodic boundaries; the body ends there",
-                )
+            let words = [argument(0)?, argument(1)?, argument(2)?];
+            if words.iter().any(|word| word.contains('p')) {
+                log.left_out(node, NO_PERIODICITY)
             } else {
                 log.taken(node, "bodies are free")
             }
+            // A word has one letter for both faces, or one letter for the lower and one for the upper face.
+            model.has_upper_face = Some(words.map(|word| word.ends_with(['s', 'm'])));
         }
         "atom_style" => log.taken(node, "points with volume and density"),
         "lattice" => {
@@ -115,6 +136,11 @@ pub(super) fn setup(
                 .find(|(name, ..)| arguments.get(1) == Some(&name.as_str()));
             model.bounds = found.map(|(_, region, _)| region.bounds());
             log.taken(node, "bounds of regions without end");
+            if model.has_upper_face.is_none() {
+                let note = "the script has no `boundary`, so LAMMPS uses the default `p p p`";
+                log.approximated(node, note);
+                log.approximated(node, NO_PERIODICITY);
+            }
         }
         "create_atoms" => {
             let kind = number(0)? as u32;
@@ -133,14 +159,21 @@ pub(super) fn setup(
                     ("box".to_owned(), Region::Block(bounds[0], bounds[1]))
                 }
                 style => {
-                    log.left_out(node, format!("atoms of style {style} are not created"));
+                    lose_model(format!("atoms of style {} are not created", excerpt(style)));
                     return Ok(());
                 }
             };
             let (name, region) = region;
-            let region = model
-                .bounds
-                .map_or(region.clone(), |bounds| region.within(bounds));
+            let region = model.bounds.map_or(region.clone(), |bounds| {
+                let has_face = model.has_upper_face.unwrap_or([false; 3]);
+                let [lower, mut upper] = bounds;
+                for (upper, has_face) in upper.iter_mut().zip(has_face) {
+                    if !has_face {
+                        *upper = Region::below(*upper, model.spacing.unwrap_or(1.0));
+                    }
+                }
+                region.within(bounds).clipped([lower, upper])
+            });
             if !region.is_finite() {
                 return Err(fail("the region has no end".to_owned()));
             }
@@ -149,11 +182,23 @@ pub(super) fn setup(
         }
         "delete_atoms" => {
             let region = match (argument(0)?, argument(1)?) {
-                ("region", name) => model.regions.iter().find(|(other, ..)| other == name),
+                ("region", name) => {
+                    let mut regions = model.regions.iter();
+                    let found = regions.find(|(other, ..)| other == name);
+                    found.map(|(_, region, _)| region.clone())
+                }
+                ("group", name) => {
+                    if let Some(Group::Type(kind)) = find(model, name) {
+                        model.atoms.retain(|atoms| atoms.kind != kind);
+                        log.taken(node, "its atoms are in no body");
+                        return Ok(());
+                    }
+                    region_of(model, name)
+                }
                 _ => None,
             };
-            let Some((_, region, _)) = region else {
-                log.left_out(node, "only atoms of a region can be left out of a body");
+            let Some(region) = region else {
+                lose_model("only atoms of a region or type can be left out of a body".to_owned());
                 return Ok(());
             };
             for atoms in &mut model.atoms {
@@ -191,43 +236,52 @@ pub(super) fn setup(
         "set" => properties(translation, variables, model, command)?,
         "group" => {
             let name = argument(0)?;
+            let mut groups = model.groups.iter_mut();
+            if let Some((_, group, _)) = groups.find(|(other, ..)| other == name) {
+                *group = Group::Other;
+                log.left_out(node, "a group must have one definition");
+                return Ok(());
+            }
             let group = match arguments.get(1).copied() {
                 Some("type") if arguments.len() == 3 => Group::Type(number(2)? as u32),
                 Some("region") if arguments.len() == 3 => Group::Region(arguments[2].to_owned()),
-                _ => {
-                    log.left_out(node, "a group must be that of one type or region");
-                    return Ok(());
-                }
+                _ => Group::Other,
             };
-            log.taken(node, "the set of what uses it");
+            if group == Group::Other {
+                log.left_out(node, "a group must be that of one type or region");
+            } else {
+                log.taken(node, "the set of what uses it");
+            }
             model.groups.push((name.to_owned(), group, node.clone()));
         }
-        "velocity" => velocity(translation, variables, model, command)?,
+        "velocity" => velocities::read(translation, variables, model, command)?,
         "variable" => log.taken(node, "its value where it is used"),
         "fix" if arguments.get(2).map(|style| without_suffix(style)) == Some("viscous") => {
             let drag = number(3)?;
-            match argument(1)? {
-                "all" if arguments.len() > 4 => {
-                    log.left_out(node, "damping is equal for all types of atoms")
-                }
+            let reason = match argument(1)? {
+                "all" if arguments.len() > 4 => "damping is equal for all types of atoms",
                 "all" => {
                     model.drag = Some(drag);
-                    log.taken(
-                        node,
-                        "damping of the materials: force over velocity, density and volume",
-                    );
+                    let note = "damping of the materials: force density over velocity and density";
+                    log.taken(node, note);
+                    return Ok(());
                 }
-                _ => log.left_out(node, "damping acts on all points of a material"),
-            }
+                _ => "damping acts on all points of a material",
+            };
+            let name = format!("fix {}", argument(0)?);
+            translation.leave_out_load(node, "condition", &name, reason);
         }
         "read_data" | "read_restart" => {
             let message =
                 "atoms of a file are not read; write them as a point file, and their deck by hand";
             return Err(fail(message.to_owned()));
         }
+        "include" => log.taken(node, "its commands are read"),
         name => {
-            if let Some(reason) = ignored(name) {
+            if let Some(reason) = ignored(command) {
                 log.left_out(node, reason);
+            } else if CHANGES.contains(&name) {
+                lose_model(format!("{name} has no counterpart"));
             }
         }
     }
@@ -236,12 +290,35 @@ pub(super) fn setup(
 
 /// Return the reason why a command is left out, if it is left out both before and after the first `run`.
 /// Return `None` for other commands.
-pub(super) fn ignored(name: &str) -> Option<&'static str> {
-    match name {
-        "if" | "jump" | "next" | "include" => Some("control flow is not followed"),
+pub(super) fn ignored(command: &Command) -> Option<&'static str> {
+    match command.name() {
+        "jump" => Some(NO_CONTROL_FLOW),
+        "if" if has_effect(command) => Some(NO_CONTROL_FLOW),
+        "if" | "next" => Some("control flow is not followed"),
         name if WORKINGS.contains(&name) => Some("concerns the way LAMMPS works or what it prints"),
         _ => None,
     }
+}
+
+/// Test whether a command that `if` may run has an effect on the results.
+fn has_effect(command: &Command) -> bool {
+    let arguments = command.arguments();
+    let mut words = arguments.iter().skip_while(|word| **word != "then");
+    while let Some(word) = words.next() {
+        match *word {
+            "then" | "else" => {}
+            "elif" => {
+                words.next();
+            }
+            word => {
+                let name = word.split_whitespace().next().unwrap_or("");
+                if name != "quit" && !WORKINGS.contains(&name) {
+                    return true;
+                }
+            }
+        }
+    }
+    false
 }
 
 /// Return the first key of `set` that moves atoms or sets their velocity.
@@ -268,102 +345,61 @@ fn properties(
         translation.leave_out_load(node, "initial", "set", &note);
     }
     let log = &translation.log;
-    let kind = match arguments[..] {
-        ["group", "all", ..] => None,
-        ["type", kind, ..] => match kind.parse::<u32>() {
-            Ok(kind) => Some(kind),
-            Err(_) => {
-                log.left_out(node, "properties are those of all atoms or of one type");
-                return Ok(());
-            }
-        },
-        ["group", name, ..] => {
-            let group = model.groups.iter().find(|(other, ..)| other == name);
-            match group {
-                Some((_, Group::Type(kind), _)) => Some(*kind),
-                _ => {
-                    log.left_out(node, "properties are those of all atoms or of one type");
-                    return Ok(());
-                }
-            }
-        }
-        _ => {
-            log.left_out(node, "properties are those of all atoms or of one type");
-            return Ok(());
-        }
+    let lose = |reason: &str| {
+        log.left_out(node, reason);
+        log.left_out(node, OTHER_MODEL);
     };
-    let mut rest = &arguments[2..];
-    while let [key, value, others @ ..] = rest {
-        let number = variables
-            .number(value)
-            .map_err(|message| wrong(translation, command, message))?;
+    let pairs: Vec<(&str, &str)> = arguments[arguments.len().min(2)..]
+        .chunks_exact(2)
+        .map(|pair| (pair[0], pair[1]))
+        .collect();
+    let number = |value: &str| {
+        let number = variables.number(value);
+        number.map_err(|message| wrong(translation, command, message))
+    };
+    for (_, value) in pairs.iter().filter(|(key, _)| *key == "type") {
+        let kind = number(value)? as u32;
+        match retype(model, &arguments, kind) {
+            Ok(()) => log.taken(node, "the type of atoms"),
+            Err(reason) => lose(reason),
+        }
+    }
+    let is_other = |(key, _): &&(&str, &str)| *key != "type" && !INITIAL_VALUES.contains(key);
+    let pairs: Vec<_> = pairs.iter().filter(is_other).collect();
+    if pairs.is_empty() {
+        return Ok(());
+    }
+    let kind = match arguments[..] {
+        ["group", name, ..] => match find(model, name) {
+            Some(Group::All) => Some(None),
+            Some(Group::Type(kind)) => Some(Some(kind)),
+            _ => None,
+        },
+        ["type", kind, ..] => kind.parse::<u32>().ok().map(Some),
+        _ => None,
+    };
+    let Some(kind) = kind else {
+        lose("properties are those of all atoms or of one type");
+        return Ok(());
+    };
+    for (key, value) in pairs {
         match *key {
             "density" => {
-                model.densities.push((kind, number));
+                model.densities.push((kind, number(value)?));
                 log.taken(node, "density of the material");
             }
             "volume" => {
                 let cell = model.spacing.map_or(f64::NAN, |spacing| spacing.powi(3));
-                if (number / cell - 1.0).abs() < 1e-6 {
+                if (number(value)? / cell - 1.0).abs() < 1e-6 {
                     log.taken(node, "the volume of a lattice cell")
                 } else {
-                    log.approximated(
-                        node,
-                        format!("the volume of a point is that of a cell, {cell:e}"),
-                    )
+                    let note = format!("the volume of a point is that of a cell, {cell:e}");
+                    log.approximated(node, note);
+                    log.approximated(node, OTHER_MODEL);
                 }
             }
-            key if INITIAL_VALUES.contains(&key) => {}
             key => log.left_out(node, format!("{} is no property of points", excerpt(key))),
         }
-        rest = others;
     }
-    Ok(())
-}
-
-/// Read `velocity … set`. Other styles of `velocity` are not read.
-fn velocity(
-    translation: &Translation,
-    variables: &Variables,
-    model: &mut Model,
-    command: &Command,
-) -> Result<()> {
-    let log = &translation.log;
-    let arguments = command.arguments();
-    let [group, "set", vx, vy, vz, options @ ..] = &arguments[..] else {
-        return Ok(());
-    };
-    let is_box = options.windows(2).any(|pair| pair == ["units", "box"]);
-    let unit = if is_box {
-        1.0
-    } else {
-        model.spacing.unwrap_or(1.0)
-    };
-    let is_earlier = |earlier: &Velocity| earlier.group == *group || earlier.group == "all";
-    let found = model.velocities.iter().rposition(is_earlier);
-    let mut components = found.map_or([None; 3], |at| model.velocities[at].components);
-    let others = &model.velocities[found.map_or(0, |at| at + 1)..];
-    if [vx, vy, vz].contains(&&"NULL") && !others.is_empty() {
-        log.approximated(
-            &command.node,
-            "NULL keeps the velocity of the same group or of all, not that of a group in between",
-        );
-    }
-    for (component, word) in components.iter_mut().zip([vx, vy, vz]) {
-        if *word != "NULL" {
-            let value = variables
-                .number(word)
-                .map_err(|message| wrong(translation, command, message))?;
-            *component = Some(unit * value);
-        }
-    }
-    if options.contains(&"sum") && options.windows(2).any(|pair| pair == ["sum", "yes"]) {
-        log.approximated(&command.node, "velocities replace earlier ones");
-    }
-    model.velocities.push(Velocity {
-        node: command.node.id,
-        group: (*group).to_owned(),
-        components,
-    });
     Ok(())
 }

@@ -5,7 +5,7 @@ use crate::error::{Result, excerpt};
 use crate::import::bodies::{Criterion, DamageModel, Material};
 use crate::import::draft::{Section, Value};
 use crate::import::elastic::Constants;
-use crate::import::log::OTHER_INFLUENCE;
+use crate::import::log::{Fate, OTHER_INFLUENCE};
 use crate::import::translation::Translation;
 use crate::import::tree::{Node, is_key};
 
@@ -180,7 +180,19 @@ pub(super) fn read_materials(
                 } else {
                     1.25
                 };
-                constants.write_one(&mut section, (translation.dimension == 2).then_some(factor))
+                let factor = (translation.dimension == 2).then_some(factor);
+                let used = constants.write_one(&mut section, factor);
+                for key in constants.keys() {
+                    let node = Constants::node(table, key);
+                    if let (Some(node), Some(used)) = (node, used)
+                        && !used.contains(&key)
+                    {
+                        let note =
+                            "the other constants determine the stiffness of a bond-based material";
+                        translation.log.replace(node, Fate::LeftOut, note);
+                    }
+                }
+                used.is_some()
             }
             _ => {
                 constants.write_two(&mut section);
