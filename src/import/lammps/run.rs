@@ -142,7 +142,7 @@ pub(super) fn follow(
             translation.log.taken(node, "[time] end");
             if !variables.has_step {
                 let note = format!(
-                    "without `timestep`, the time step is the default of the units, {step:e}"
+                    "without `timestep`, the time step is the default of the units, {step:?}"
                 );
                 translation.log.taken(node, note);
             }
