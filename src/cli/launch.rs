@@ -117,9 +117,9 @@ pub fn cores() -> usize {
 /// Environment variable with Slurm's number of cores per task.
 const SLURM_CORES: &str = "SLURM_CPUS_PER_TASK";
 
-/// Return the number of threads: the requested number, else Slurm's number of cores per task, else the number
-/// of cores of this process. In the last case, if the launcher has not bound the process to cores, the ranks
-/// on one host share the cores evenly.
+/// Return the number of threads: the requested number, else Slurm's number of cores per task if it is not 0,
+/// else the number of cores of this process. In the last case, if the launcher has not bound the process to
+/// cores, the ranks on one host share the cores evenly.
 fn threads(asked: Option<u16>) -> usize {
     let share = || {
         let shared_by = if is_bound() { 1 } else { ranks_on_host() };
@@ -127,7 +127,7 @@ fn threads(asked: Option<u16>) -> usize {
     };
     asked
         .map(usize::from)
-        .or_else(|| number(&[SLURM_CORES]))
+        .or_else(|| number(&[SLURM_CORES]).filter(|cores| *cores > 0))
         .unwrap_or_else(share)
 }
 
