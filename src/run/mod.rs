@@ -47,7 +47,7 @@ use std::path::PathBuf;
 
 use crate::comm::mpi::{self, World};
 use crate::comm::sum::{ExactSum, reduce};
-use crate::comm::{self, Communicator, agree};
+use crate::comm::{self, Communicator, agree, check_equal};
 use crate::deck::{Deck, Source};
 use crate::error::{Error, Result};
 use crate::output::{self, Creation};
@@ -108,6 +108,7 @@ pub fn start_mpi() -> Result<World> {
 /// The error is the same on all ranks. There is an error if:
 ///
 /// - the problem cannot be run;
+/// - the ranks have different problems, decks or folders, or handle existing files differently;
 /// - a signal stopped the run before the first step;
 /// - the folder contains files that must not be replaced;
 /// - the checkpoint is missing or belongs to another problem;
@@ -139,6 +140,7 @@ fn run_unlocated(
     let calibrated = agree(comm, calibrated(problem))?;
     let explained = options.deck.as_ref().map(Deck::explain).transpose();
     let explained = agree(comm, explained)?;
+    check_inputs(problem, comm, options, explained.as_deref())?;
     let files = Files::new(problem, options.folder.clone());
     // The folder is locked before any file changes, and until the end of the run.
     let prepared = match comm.rank() {
@@ -164,6 +166,37 @@ fn run_unlocated(
         2 => job.run::<2>(),
         _ => job.run::<3>(),
     }
+}
+
+/// Check that all ranks have the same inputs. `explained` is the deck with all defaults. Collective.
+///
+/// # Errors
+/// If an input of a rank differs from that of rank 0.
+fn check_inputs(
+    problem: &Problem,
+    comm: &dyn Communicator,
+    options: &Options,
+    explained: Option<&str>,
+) -> Result<()> {
+    let deck = options.deck.as_ref().map(|deck| &deck.source().text);
+    check_equal(
+        comm,
+        &(problem, deck, explained),
+        "problem",
+        "all ranks must run the same deck and read equal files, such as tables and ids of points",
+    )?;
+    check_equal(
+        comm,
+        &options.folder,
+        "output folder",
+        "all ranks must write to the same folder (--output)",
+    )?;
+    check_equal(
+        comm,
+        &options.existing,
+        "handling of existing files",
+        "--restart or --overwrite must be given to all ranks or to none",
+    )
 }
 
 /// Outcome of the time loop.
@@ -588,6 +621,7 @@ impl<'a> Job<'a> {
             ],
             None => Default::default(),
         };
+        let path = self.text_of_rank_0(&path);
         let model = &simulation.model;
         let mut mass = [ExactSum::ZERO];
         for point in 0..model.owned() {
