@@ -30,6 +30,7 @@ mod output_file;
 mod recorder;
 mod restart;
 mod restart_compatibility;
+mod shared_folder;
 mod signals;
 mod stale_files;
 mod summary;
@@ -109,6 +110,7 @@ pub fn start_mpi() -> Result<World> {
 ///
 /// - the problem cannot be run;
 /// - the ranks have different problems, decks or folders, or handle existing files differently;
+/// - a rank does not see the folder that rank 0 has created;
 /// - a signal stopped the run before the first step;
 /// - the folder contains files that must not be replaced;
 /// - the checkpoint is missing or belongs to another problem;
@@ -152,7 +154,8 @@ fn run_unlocated(
         }),
         _ => Ok(None),
     };
-    let _lock = agree(comm, prepared)?;
+    let lock = agree(comm, prepared)?;
+    shared_folder::check(comm, &files, lock.as_ref(), shared_folder::TIMEOUT)?;
     let mut job = Job {
         problem: &calibrated,
         comm,
