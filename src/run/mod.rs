@@ -652,6 +652,9 @@ impl<'a> Job<'a> {
             ("mass", mass.to_string()),
             ("time_step", simulation.clock.step().to_string()),
         ];
+        if self.options.deck.is_none() {
+            metadata.push(("problem", self.physics.clone()));
+        }
         let more = self.options.attributes.iter();
         metadata.extend(more.map(|(name, text)| (*name, self.text_of_rank_0(text))));
         metadata
