@@ -206,7 +206,8 @@ pub fn bench(arguments: &BenchArguments, verbosity: Verbosity) -> ExitCode {
 fn measure(world: &World, arguments: &BenchArguments, threads: usize) -> Result<Figures> {
     let before = resident();
     let deck = Deck::new(Source::new("benchmark.toml", deck(arguments)))?;
-    let speed = speed(&deck.problem()?, world, warm_up(arguments), arguments.steps);
+    let problem = deck.problem_on(world)?;
+    let speed = speed(&problem, world, warm_up(arguments), arguments.steps);
     let speed = speed.map_err(|error| deck.locate(error))?;
 
     let total = |value: u64| comm::total(world, value) as f64;

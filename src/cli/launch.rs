@@ -49,7 +49,7 @@ const SIZES: [&str; 5] = [
     "MV2_COMM_WORLD_SIZE",
     "PMI_SIZE",
     "MPI_LOCALNRANKS",
-    "SLURM_STEP_NUM_TASKS",
+    SLURM_TASKS,
 ];
 
 /// Return the name of the variable that gives the number of launched processes, and this number. `None`
@@ -58,6 +58,28 @@ fn started() -> Option<(&'static str, usize)> {
     SIZES
         .iter()
         .find_map(|name| Some((*name, number(&[name])?)))
+}
+
+/// Environment variables that the launchers of MPI set for each rank, also for a single rank.
+const MPI_LAUNCHERS: [&str; 4] = [
+    "OMPI_COMM_WORLD_SIZE",
+    "MV2_COMM_WORLD_SIZE",
+    "PMIX_RANK",
+    "PMI_RANK",
+];
+
+/// Environment variable with the number of processes that `srun` started. Slurm sets it to 1 also for the
+/// shell of an interactive job, and does not set it for a batch script.
+const SLURM_TASKS: &str = "SLURM_STEP_NUM_TASKS";
+
+/// Return the name of a variable which shows that a launcher started this process as a rank; `None` without a
+/// launcher. Processes that a rank starts inherit these variables. MPI in these processes could then wait
+/// forever for the launcher.
+pub fn launcher_variable() -> Option<&'static str> {
+    let is_set = |name: &&str| std::env::var_os(name).is_some();
+    let by_mpi = MPI_LAUNCHERS.into_iter().find(|name| is_set(name));
+    let by_slurm = number(&[SLURM_TASKS]).is_some_and(|tasks| tasks > 1);
+    by_mpi.or(by_slurm.then_some(SLURM_TASKS))
 }
 
 /// Check that the launcher works with the MPI library of this program. With an incompatible launcher, each
@@ -117,9 +139,9 @@ pub fn cores() -> usize {
 /// Environment variable with Slurm's number of cores per task.
 const SLURM_CORES: &str = "SLURM_CPUS_PER_TASK";
 
-/// Return the number of threads: the requested number, else Slurm's number of cores per task, else the number
-/// of cores of this process. In the last case, if the launcher has not bound the process to cores, the ranks
-/// on one host share the cores evenly.
+/// Return the number of threads: the requested number, else Slurm's number of cores per task if it is not 0,
+/// else the number of cores of this process. In the last case, if the launcher has not bound the process to
+/// cores, the ranks on one host share the cores evenly.
 fn threads(asked: Option<u16>) -> usize {
     let share = || {
         let shared_by = if is_bound() { 1 } else { ranks_on_host() };
@@ -127,7 +149,7 @@ fn threads(asked: Option<u16>) -> usize {
     };
     asked
         .map(usize::from)
-        .or_else(|| number(&[SLURM_CORES]))
+        .or_else(|| number(&[SLURM_CORES]).filter(|cores| *cores > 0))
         .unwrap_or_else(share)
 }
 

@@ -5,6 +5,7 @@
 //! one rank without MPI, and for tests with several ranks in one process.
 
 mod by_id;
+mod equality;
 mod file_sync;
 pub mod halo;
 pub mod mpi;
@@ -13,6 +14,7 @@ pub mod sum;
 pub mod threads;
 
 pub use by_id::IdOrder;
+pub use equality::check_equal;
 pub use file_sync::without_fsync;
 pub use halo::Halo;
 pub use sum::ExactSum;

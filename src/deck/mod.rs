@@ -45,7 +45,7 @@ pub use difference::{differences, history_differences};
 pub use schema::schema;
 pub use source::Source;
 
-use crate::comm::{Communicator, agree, threads, total};
+use crate::comm::{Communicator, agree, check_equal, threads, total};
 use crate::error::{Error, Result, Warning};
 use crate::problem::Problem;
 use resolve::Scope;
@@ -151,8 +151,15 @@ impl Deck {
     /// Same as [`Self::problem`], on several ranks with the same deck. Collective.
     ///
     /// # Errors
-    /// If a value is invalid; the error is the same on all ranks.
+    /// If a value is invalid, or the decks of the ranks differ; the error is the same on all ranks.
     pub fn problem_on(&self, comm: &dyn Communicator) -> Result<Problem> {
+        check_equal(
+            comm,
+            &(&self.source.text, &self.grammar),
+            "deck",
+            "all ranks must read equal decks, overlays and --set values; the deck must be on a file system that \
+             all nodes share, and must not be edited during the start",
+        )?;
         let mut scope = agree(comm, Scope::of(&self.source, &self.grammar))?;
         let grammar = self.with_horizons(&mut scope, comm)?;
         agree(comm, self.problem_in(&scope, grammar))

@@ -12,6 +12,7 @@ use crate::problem::{PointSource, Problem};
 
 use super::columns::{Columns, Layout, layout};
 use super::rows::{Part, for_each_row};
+use super::same_file::check_same_file;
 use super::{BodyPoints, Point};
 
 /// Return the bodies that use a file: index of the body, and the block number that the body selects. Without
@@ -67,8 +68,8 @@ pub fn layout_of(
 /// Collective.
 ///
 /// # Errors
-/// If the file cannot be read, or the heading or a row is invalid. The message gives the file, and the line
-/// of the heading or row.
+/// If the file cannot be read, the ranks read different contents, or the heading or a row is invalid. The
+/// message gives the file, and the line of the heading or row.
 pub(super) fn for_each_point(
     bodies: &[BodyPoints],
     dimension: usize,
@@ -84,6 +85,7 @@ pub(super) fn for_each_point(
         let message = format!("cannot read the point file {}: {error}", path.display());
         Error::input(message).at(span)
     };
+    check_same_file(path, comm, unreadable)?;
     let layout = layout_of(bodies, dimension, path);
     let layout = agree(comm, layout.map_err(unreadable).flatten())?;
     let part = read_part(path, &layout, &users, [comm.rank(), comm.size()], take);

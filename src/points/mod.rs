@@ -14,6 +14,7 @@ pub(crate) mod mesh;
 mod polygon;
 mod region;
 mod rows;
+mod same_file;
 pub mod set;
 pub mod shape;
 pub mod value_file;

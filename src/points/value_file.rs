@@ -8,6 +8,7 @@ use crate::problem::InitialFile;
 
 use super::columns::heading;
 use super::rows::for_each_row;
+use super::same_file::check_same_file;
 
 /// Names of the columns of displacements (m), by component.
 const DISPLACEMENT: [&str; 3] = ["ux", "uy", "uz"];
@@ -105,13 +106,18 @@ pub type Row = (u64, Vec<f64>);
 /// Read this rank's part of the rows. `total` is the number of points. Collective.
 ///
 /// # Errors
-/// - If the file cannot be read.
+/// - If the file cannot be read, or the ranks read different contents.
 /// - If a row is invalid, or has an id that no point has.
 /// - If a file without ids has more rows than there are points.
 ///
 /// The message gives the file, and the line of a wrong row.
 pub fn read(file: &InitialFile, total: u64, comm: &dyn Communicator) -> Result<Vec<Row>> {
     let columns = &file.columns;
+    let unreadable = |error| {
+        let message = format!("cannot read the file {}: {error}", file.path.display());
+        Error::input(message).at(&file.span)
+    };
+    check_same_file(&file.path, comm, unreadable)?;
     let mut rows = Vec::new();
     let part = for_each_row(
         &file.path,
@@ -122,11 +128,7 @@ pub fn read(file: &InitialFile, total: u64, comm: &dyn Communicator) -> Result<V
             Ok(())
         },
     );
-    let part = part.map_err(|error| {
-        let message = format!("cannot read the file {}: {error}", file.path.display());
-        Error::input(message).at(&file.span)
-    });
-    agree(comm, part)?.check(&file.path, comm)?;
+    agree(comm, part.map_err(unreadable))?.check(&file.path, comm)?;
     if columns.id.is_none() {
         let (before, count) = crate::comm::scan(comm, rows.len() as u64);
         if count > total {

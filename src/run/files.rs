@@ -126,8 +126,12 @@ impl Files {
         }
         fs::create_dir_all(&self.folder)
             .map_err(|error| Error::file(&self.folder, "create the folder", &error))?;
-        let path = self.folder.join(".lock");
-        let file = fs::File::create(&path).map_err(|error| Error::file(&path, "create", &error))?;
+        let path = self.lock_path();
+        // The content belongs to the run that holds the lock, so it is not truncated here.
+        let mut opened = fs::OpenOptions::new();
+        opened.write(true).create(true).truncate(false);
+        let file = opened.open(&path);
+        let file = file.map_err(|error| Error::file(&path, "create", &error))?;
         let begin = Instant::now();
         loop {
             match file.try_lock() {
@@ -146,6 +150,11 @@ impl Files {
                 Ok(()) | Err(fs::TryLockError::Error(_)) => return Ok(file),
             }
         }
+    }
+
+    /// Return the path of the lock file of the folder.
+    pub fn lock_path(&self) -> PathBuf {
+        self.folder.join(".lock")
     }
 
     /// Rename existing files of a result, so that new files can be created. The new names contain `number`,

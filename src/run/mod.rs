@@ -30,6 +30,7 @@ mod output_file;
 mod recorder;
 mod restart;
 mod restart_compatibility;
+mod shared_folder;
 mod signals;
 mod stale_files;
 mod summary;
@@ -47,7 +48,7 @@ use std::path::PathBuf;
 
 use crate::comm::mpi::{self, World};
 use crate::comm::sum::{ExactSum, reduce};
-use crate::comm::{self, Communicator, agree};
+use crate::comm::{self, Communicator, agree, check_equal};
 use crate::deck::{Deck, Source};
 use crate::error::{Error, Result};
 use crate::output::{self, Creation};
@@ -108,6 +109,8 @@ pub fn start_mpi() -> Result<World> {
 /// The error is the same on all ranks. There is an error if:
 ///
 /// - the problem cannot be run;
+/// - the ranks have different problems, decks or folders, or handle existing files differently;
+/// - a rank does not see the folder that rank 0 has created;
 /// - a signal stopped the run before the first step;
 /// - the folder contains files that must not be replaced;
 /// - the checkpoint is missing or belongs to another problem;
@@ -139,6 +142,7 @@ fn run_unlocated(
     let calibrated = agree(comm, calibrated(problem))?;
     let explained = options.deck.as_ref().map(Deck::explain).transpose();
     let explained = agree(comm, explained)?;
+    check_inputs(problem, comm, options, explained.as_deref())?;
     let files = Files::new(problem, options.folder.clone());
     // The folder is locked before any file changes, and until the end of the run.
     let prepared = match comm.rank() {
@@ -150,7 +154,8 @@ fn run_unlocated(
         }),
         _ => Ok(None),
     };
-    let _lock = agree(comm, prepared)?;
+    let lock = agree(comm, prepared)?;
+    shared_folder::check(comm, &files, lock.as_ref(), shared_folder::TIMEOUT)?;
     let mut job = Job {
         problem: &calibrated,
         comm,
@@ -164,6 +169,37 @@ fn run_unlocated(
         2 => job.run::<2>(),
         _ => job.run::<3>(),
     }
+}
+
+/// Check that all ranks have the same inputs. `explained` is the deck with all defaults. Collective.
+///
+/// # Errors
+/// If an input of a rank differs from that of rank 0.
+fn check_inputs(
+    problem: &Problem,
+    comm: &dyn Communicator,
+    options: &Options,
+    explained: Option<&str>,
+) -> Result<()> {
+    let deck = options.deck.as_ref().map(|deck| &deck.source().text);
+    check_equal(
+        comm,
+        &(problem, deck, explained),
+        "problem",
+        "all ranks must run the same deck and read equal files, such as tables and ids of points",
+    )?;
+    check_equal(
+        comm,
+        &options.folder,
+        "output folder",
+        "all ranks must write to the same folder (--output)",
+    )?;
+    check_equal(
+        comm,
+        &options.existing,
+        "handling of existing files",
+        "--restart or --overwrite must be given to all ranks or to none",
+    )
 }
 
 /// Outcome of the time loop.
@@ -588,6 +624,7 @@ impl<'a> Job<'a> {
             ],
             None => Default::default(),
         };
+        let path = self.text_of_rank_0(&path);
         let model = &simulation.model;
         let mut mass = [ExactSum::ZERO];
         for point in 0..model.owned() {
@@ -615,6 +652,9 @@ impl<'a> Job<'a> {
             ("mass", mass.to_string()),
             ("time_step", simulation.clock.step().to_string()),
         ];
+        if self.options.deck.is_none() {
+            metadata.push(("problem", self.physics.clone()));
+        }
         let more = self.options.attributes.iter();
         metadata.extend(more.map(|(name, text)| (*name, self.text_of_rank_0(text))));
         metadata

@@ -19,7 +19,7 @@ use super::files::Files;
 use super::layout::{FIXED, select};
 use super::observer::{Observer, Row};
 use super::output_file::{OutputFile, Start, output_rows};
-use super::restart_compatibility::history_differences;
+use super::restart_compatibility::{self, history_differences, in_one_line};
 
 /// Number of history rows that are buffered before a write.
 const BUFFERED_ROWS: usize = 256;
@@ -351,12 +351,12 @@ pub fn reasons_for_new_results<const D: usize>(
                 let changed = agree(simulation.comm, changed)?;
                 let history = Some((&observer, header.rows, changed));
                 let counted = (output, path, header.outputs);
-                reason_for_new_result(simulation, counted, history)?
+                reason_for_new_result(simulation, counted, physics, history)?
             }
             Some(name) => match header.further.iter().find(|result| result.name == *name) {
                 Some(known) => {
                     let counted = (output, path, known.outputs);
-                    reason_for_new_result(simulation, counted, None)?
+                    reason_for_new_result(simulation, counted, physics, None)?
                 }
                 None => {
                     let there = || {
@@ -391,12 +391,14 @@ pub enum Continuation {
 /// continued. Possible reasons are:
 ///
 /// - the file is missing or damaged;
+/// - the file belongs to a run with other physics;
 /// - the file has fewer outputs or rows than the checkpoint counts;
 /// - the deck requests other points, fields, precision or history columns;
 /// - the deck defines a history column in another way;
 /// - adaptive refinement was switched on or off.
 ///
-/// `outputs` is the number of outputs that the checkpoint counts. For the main result, `history` contains the
+/// `outputs` is the number of outputs that the checkpoint counts, `physics` the description of the physics, see
+/// [`restart_compatibility::describe`]. For the main result, `history` contains the
 /// observer, the number of rows that the checkpoint counts, and the changes of the column definitions.
 /// Collective.
 ///
@@ -405,6 +407,7 @@ pub enum Continuation {
 fn reason_for_new_result<const D: usize>(
     simulation: &Simulation<'_, D>,
     (output, path, outputs): (&Output, &Path, u64),
+    physics: &str,
     history: Option<(&HistoryObserver, u64, Option<String>)>,
 ) -> Result<Option<String>> {
     let comm: &dyn Communicator = simulation.comm;
@@ -430,6 +433,10 @@ fn reason_for_new_result<const D: usize>(
             .map_or(0, |column| column.values.len() as u64);
         let found_outputs = reader.steps()?.len() as u64;
         reader.times()?;
+        if let Some(differences) = other_physics(&reader, physics)? {
+            let text = format!("the result so far is of another run ({differences})");
+            return Ok(Some(text));
+        }
         let counted_rows = history.as_ref().map_or(0, |(_, rows, _)| *rows);
         if found_outputs < outputs || rows < counted_rows {
             let text = "the result so far has fewer outputs or rows than the checkpoint counts";
@@ -471,6 +478,20 @@ fn reason_for_new_result<const D: usize>(
         Ok(changed.map(|lines| format!("history columns have another definition: {lines}")))
     };
     check_on_rank_0(comm, compare)
+}
+
+/// Compare the physics of a result with the physics of this run. Return the differences; `None` if there are
+/// none.
+///
+/// # Errors
+/// If the attributes of the result cannot be read, or its deck cannot be parsed.
+fn other_physics(reader: &ResultReader, physics: &str) -> Result<Option<String>> {
+    let name = restart_compatibility::attribute(physics);
+    let mut attributes = reader.attributes()?.into_iter();
+    let stored = attributes.find(|(stored, _)| stored == name);
+    let stored = stored.map_or(String::new(), |(_, text)| text);
+    let differences = restart_compatibility::differences(&stored, physics)?;
+    Ok(in_one_line(&differences))
 }
 
 /// Check that the first `outputs` outputs of a result file can be read. Return a description of the damage,

@@ -43,6 +43,15 @@ pub fn describe(problem: &Problem, deck: Option<&str>) -> String {
     format!("{WITHOUT_DECK}{problem:#?}\n{HISTORY}{history:#?}\n")
 }
 
+/// Return the name of the attribute of a result that contains a description by [`describe`].
+pub fn attribute(physics: &str) -> &'static str {
+    if physics.starts_with(WITHOUT_DECK) {
+        "problem"
+    } else {
+        "deck_in_full"
+    }
+}
+
 /// Return the differences in the definitions of the history's columns, in one line; `None` if the definitions
 /// are equal.
 ///
@@ -55,9 +64,15 @@ pub fn history_differences(old: &str, new: &str) -> Result<Option<String>> {
     } else {
         deck::history_differences(&source("the checkpoint", old), &source("the deck", new))?
     };
+    Ok(in_one_line(&lines))
+}
+
+/// Join the first differences to one line; `None` if there are none.
+pub fn in_one_line(differences: &[String]) -> Option<String> {
     let short = |line: &String| line.chars().take(MAX_LINE).collect::<String>();
-    let shown: Vec<String> = lines.iter().take(MAX_DIFFERENCES).map(short).collect();
-    Ok((!shown.is_empty()).then(|| shown.join("; ")))
+    let shown = differences.iter().take(MAX_DIFFERENCES).map(short);
+    let shown: Vec<String> = shown.collect();
+    (!shown.is_empty()).then(|| shown.join("; "))
 }
 
 fn source(name: &str, text: &str) -> Source {

@@ -426,6 +426,27 @@ fn far_more_threads_than_cores() {
 }
 
 #[test]
+fn slurm_without_a_number_of_cores() {
+    let folder = Folder::new("no-cores");
+    let deck = folder.join("plate.toml");
+    succeed(fissure(1).arg("init").arg(&deck));
+    let threads = |cores: Option<&str>| {
+        let mut command = fissure(1);
+        command.args(["run", "--overwrite", "--set", "time.end=1e-9"]);
+        command.arg(&deck).arg("--output").arg(folder.join("out"));
+        command.env_remove("SLURM_CPUS_PER_TASK");
+        if let Some(cores) = cores {
+            command.env("SLURM_CPUS_PER_TASK", cores);
+        }
+        let printed = succeed(&mut command);
+        let line = printed.lines().find(|line| line.contains(" threads on "));
+        line.unwrap().to_owned()
+    };
+    assert_eq!(threads(Some("0")), threads(None));
+    assert!(threads(Some("1")).contains("1 ranks × 1 threads"));
+}
+
+#[test]
 fn too_many_points_to_make_are_counted_by_formula() {
     let folder = Folder::new("large");
     let deck = folder.write(

@@ -6,7 +6,8 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use crate::support::command::{
-    Folder, SmallDisc, finish, fissure, is_running, rank_processes, succeed, text, wait,
+    Folder, SmallDisc, finish, fissure, is_running, rank_processes, run_on_two_ranks, succeed,
+    text, wait,
 };
 use fissure::output::ResultReader;
 
@@ -60,6 +61,91 @@ fn a_wrong_row_that_one_rank_reads() {
         failing(&mut command, message, 2);
         assert!(!folder.join("out/result.vtkhdf").exists());
     }
+}
+
+#[test]
+fn ranks_with_different_inputs() {
+    let folder = Folder::new("inputs");
+    folder.write("deck.toml", &bar("end = 3"));
+    folder.write("longer.toml", &bar("end = 4"));
+    folder.write("overlay.toml", "time.end = 4");
+    let first = ["deck.toml", "--output", "out"];
+    let another_deck = "rank 1 has another deck than rank 0";
+    let another_folder = "rank 1 has another output folder than rank 0";
+    let another_start = "rank 1 has another handling of existing files than rank 0";
+    for (second, option, message) in [
+        (["longer.toml", "--output", "out"], &[][..], another_deck),
+        (first, &["--set", "time.end=4"], another_deck),
+        (first, &["--with", "overlay.toml"], another_deck),
+        (["deck.toml", "--output", "other"], &[], another_folder),
+        (first, &["--overwrite"], another_start),
+        (first, &["--restart"], another_start),
+    ] {
+        let second = [&second, option].concat();
+        let mut command = run_on_two_ranks([(&folder.0, &first), (&folder.0, &second)]);
+        failing(&mut command, message, 2);
+        assert!(!folder.join("out").exists(), "{second:?}");
+    }
+}
+
+#[test]
+fn ranks_with_different_copies_of_a_file() {
+    let folder = Folder::new("copies");
+    let deck = "dimension = 'plane-stress'
+        grid = { volume_correction = 'none', horizon = 3 }
+        material.rubber.pmb = { density = 2, youngs_modulus = 5 }
+        body.bar = { material = 'rubber', points.file = 'points.txt' }
+        set.some.file = 'ids.txt'
+        initial.push.file = 'values.txt'
+        time.end = 1
+        ";
+    let rows: String = (0..199)
+        .map(|k| format!("{} {} 1 0\n", k % 100, k / 100))
+        .collect();
+    let points = |last: &str| format!("{rows}99 1 {last} 0\n");
+    let write = |copy: &str| {
+        std::fs::create_dir_all(folder.join(copy)).unwrap();
+        for (name, content) in [
+            ("deck.toml", deck),
+            ("points.txt", &points("1")),
+            ("ids.txt", "3 4 5\n"),
+            ("values.txt", "id ux\n0 0.1\n199 0.1\n"),
+        ] {
+            folder.write(&format!("{copy}/{name}"), content);
+        }
+        folder.join(copy)
+    };
+    let (first, second) = (write("first"), write("second"));
+    let out = folder.join("out");
+    let arguments = ["deck.toml", "--output", out.to_str().unwrap()];
+    let run = || run_on_two_ranks([(&first, &arguments), (&second, &arguments)]);
+    let other_contents = "rank 1 reads other contents than rank 0";
+    for (name, content, message) in [
+        ("points.txt", &points("2")[..], other_contents),
+        ("values.txt", "id ux\n0 0.1\n199 0.2\n", other_contents),
+        (
+            "values.txt",
+            "id uy\n0 0.1\n199 0.1\n",
+            "rank 1 has another",
+        ),
+        (
+            "ids.txt",
+            "3 4 6\n",
+            "rank 1 has another problem than rank 0",
+        ),
+    ] {
+        write("second");
+        folder.write(&format!("second/{name}"), content);
+        failing(&mut run(), message, 2);
+        assert!(!result_exists(&out), "{name}");
+    }
+    write("second");
+    succeed(&mut run());
+    assert!(result_exists(&out));
+}
+
+fn result_exists(out: &Path) -> bool {
+    out.join("result.vtkhdf").exists()
 }
 
 #[test]

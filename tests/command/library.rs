@@ -207,6 +207,17 @@ fn a_run_from_rust_that_was_stopped_goes_on() {
     assert_eq!(notes.begun_at, Some(outcome.number));
     assert_eq!(continued.summary.steps, 400 - outcome.number);
     assert_eq!(continued.summary.checkpoints, 4);
-    let [expected, found] = [whole, parts].map(|folder| datasets(&folder.join("result.vtkhdf")));
+    let [expected, found] = [&whole, &parts].map(|folder| datasets(&folder.join("result.vtkhdf")));
     assert_eq!(difference(&expected, &found), None);
+
+    // The result of another run is not continued.
+    let foreign = folder.join("foreign");
+    run(&other, Options::new(&foreign), &mut Unobserved);
+    std::fs::copy(foreign.join("result.vtkhdf"), parts.join("result.vtkhdf")).unwrap();
+    let mut notes = Notes::default();
+    attempt(&problem, Existing::Continue, &mut notes).unwrap();
+    let reason =
+        "the result so far is of another run (was `density: 2500.0,`, is `density: 2440.0,`)";
+    let is_told = |message: &Message| matches!(message, Message::SetAside { reason: told, .. } if told == reason);
+    assert!(notes.messages.iter().any(is_told), "{:?}", notes.messages);
 }

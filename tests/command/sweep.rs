@@ -255,6 +255,25 @@ fn runs_are_started_by_a_launcher() {
 }
 
 #[test]
+fn a_sweep_under_a_launcher_is_rejected() {
+    let sweep = Sweep::new("sweep-launched");
+    for (name, value) in [
+        ("OMPI_COMM_WORLD_SIZE", "1"),
+        ("PMI_RANK", "0"),
+        ("SLURM_STEP_NUM_TASKS", "2"),
+    ] {
+        let mut command = sweep.command(&["--set", "dx=2e-3"]);
+        let output = finish(command.env(name, value));
+        let words = [name, "start fissure sweep without a launcher", "--launcher"];
+        expect(&output, 2, &words);
+        assert!(!sweep.folder.join("out").exists(), "{name}");
+    }
+    // The shell of an interactive job of Slurm.
+    let mut command = sweep.command(&["--set", "dx=2e-3"]);
+    succeed(command.env("SLURM_STEP_NUM_TASKS", "1"));
+}
+
+#[test]
 fn mistakes_are_found_before_anything_runs() {
     let sweep = Sweep::new("sweep-mistakes");
     for (options, words) in [

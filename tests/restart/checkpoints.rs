@@ -829,6 +829,40 @@ fn a_damaged_result_does_not_keep_the_checkpoint_from_going_on() {
     }
 }
 
+#[test]
+fn a_result_of_another_run_is_not_continued() {
+    let folder = Folder::new("other-run");
+    let extra = "output.top = { set = 'top', every_steps = 500 }";
+    let deck = folder.write("deck.toml", &plate("1e-5", extra));
+    let (out, other) = (folder.join("out"), folder.join("other"));
+    succeed(&mut run(1, &deck, &out, &[]));
+    succeed(&mut run(1, &deck, &other, &["--set", "pull=21e6"]));
+    for name in ["result.vtkhdf", "result_top.vtkhdf"] {
+        std::fs::copy(other.join(name), out.join(name)).unwrap();
+    }
+    let further = ["--restart", "--set", "end=1.5e-5"];
+    let output = finish(&mut run(2, &deck, &out, &further));
+    let printed = text(&output);
+    assert!(output.status.success(), "{printed}");
+    let told = "the result so far is of another run (condition.pull.traction[1]: was `pull` = 21000000, \
+                is `pull` = 20000000): starting a new result";
+    for told in [told.to_owned(), format!("[output.top]: {told}")] {
+        assert!(
+            printed.contains(&format!("warning: {told}")),
+            "{told}: {printed}"
+        );
+    }
+    for (name, steps) in [
+        ("result", &[1000, 1200, 1400, 1500][..]),
+        ("result_until_step_1000", &[0, 200, 400, 600, 800, 1000]),
+        ("result_top", &[1000, 1500]),
+        ("result_top_until_step_1000", &[0, 500, 1000]),
+    ] {
+        let reader = ResultReader::open(&out.join(format!("{name}.vtkhdf"))).unwrap();
+        assert_eq!(reader.steps().unwrap(), steps, "{name}");
+    }
+}
+
 /// Return the names in a folder, each with the inode of the file.
 fn entries(folder: &Path) -> Vec<(std::ffi::OsString, u64)> {
     use std::os::unix::fs::DirEntryExt;

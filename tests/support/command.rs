@@ -97,6 +97,20 @@ pub fn fissure(ranks: usize) -> Command {
     under_mpirun(ranks, binary)
 }
 
+/// Return `fissure run` on two ranks under mpirun. Each rank has its own current folder and arguments.
+pub fn run_on_two_ranks(ranks: [(&Path, &[&str]); 2]) -> Command {
+    let mut command = mpirun();
+    for (rank, (folder, arguments)) in ranks.into_iter().enumerate() {
+        if rank > 0 {
+            command.arg(":");
+        }
+        command.args(["-n", "1", "--wdir"]).arg(folder);
+        command.args([env!("CARGO_BIN_EXE_fissure"), "run"]);
+        command.args(arguments);
+    }
+    command
+}
+
 /// Keep Open MPI from loading the drivers of networks, two of which wait for 0.1 s when a process starts.
 const WITHOUT_NETWORK: (&str, &str) = ("OMPI_MCA_pml", "ob1");
 
@@ -118,9 +132,15 @@ pub fn is_rank(ranks: usize, test: &str) -> bool {
 }
 
 fn under_mpirun(ranks: usize, program: impl AsRef<OsStr>) -> Command {
-    let mut command = Command::new("mpirun");
-    command.args(["--bind-to", "none", "-n", &ranks.to_string()]);
+    let mut command = mpirun();
+    command.args(["-n", &ranks.to_string()]);
     command.arg(program);
+    command
+}
+
+fn mpirun() -> Command {
+    let mut command = Command::new("mpirun");
+    command.args(["--bind-to", "none"]);
     command.envs([
         WITHOUT_NETWORK,
         ("OMPI_ALLOW_RUN_AS_ROOT", "1"),

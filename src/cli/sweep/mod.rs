@@ -13,7 +13,7 @@ use fissure::deck;
 use fissure::error::{Error, Result};
 use fissure::solver::observers::column_names;
 
-use super::{Verbosity, errln, outln};
+use super::{Verbosity, errln, launch, outln};
 use design::{Axis, Design};
 use runs::{Program, Run, State};
 use table::Table;
@@ -148,11 +148,18 @@ fn planned_runs(arguments: &SweepArguments, design: &Design, folder: &Path) -> R
 /// `--overwrite`, skip complete runs. Write the table and pictures of all combinations.
 ///
 /// # Errors
+/// - If a launcher of MPI has started this process.
 /// - If the deck or an argument is wrong.
 /// - If a run fails.
 /// - If a file cannot be written.
 /// - If a signal or a time limit stops a run.
 pub fn sweep(arguments: &SweepArguments, verbosity: Verbosity) -> Result<()> {
+    if let Some(name) = launch::launcher_variable() {
+        return Err(Error::input(format!(
+            "{name} is set by a launcher such as mpirun or srun; start fissure sweep without a launcher, and \
+             give the launcher of its runs as --launcher, such as --launcher 'mpirun -n 4'"
+        )));
+    }
     let design = Design::new(&arguments.set, arguments.zip)?;
     let chosen = match &arguments.rows {
         Some(list) => design::rows(list, design.rows.len())?,
