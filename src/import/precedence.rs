@@ -47,8 +47,8 @@ impl Rewriter<'_> {
         }
     }
 
-    /// Translate the operand at index `at` and all operators after it whose precedence is at least `loosest`.
-    /// Move `at` behind them.
+    /// Translate the operand at index `at` and the operations after it, up to the first operator with a
+    /// precedence below `loosest`. Move `at` behind them.
     fn operation(
         &self,
         tokens: &[Token],
@@ -120,7 +120,7 @@ fn combine(symbol: &str, precedence: u8, left: Operand, right: Operand) -> Opera
         precedence: ATOM,
     };
     let text = match symbol {
-        // LAMMPS counts the time as `step*dt`, and `step` is written as (t/dt).
+        // In LAMMPS scripts, the time is `step*dt`. `step` is translated to (t/dt), so this product is t.
         "*" if left.text == format!("(t/{})", right.text)
             || right.text == format!("(t/{})", left.text) =>
         {

@@ -174,8 +174,9 @@ impl Region {
         }
     }
 
-    /// Return a bound that excludes atoms on the upper face of a box. `face` is the coordinate of this face.
-    /// The shapes of the new deck extend beyond their regions by `MARGIN` spacings.
+    /// Return an upper bound slightly below `face`, the coordinate of the upper face of a box. Shapes of the
+    /// new deck extend beyond their regions by `MARGIN` spacings, but with this bound they do not contain
+    /// points on the face.
     pub fn below(face: f64, spacing: f64) -> f64 {
         face - 3.0 * MARGIN * spacing
     }

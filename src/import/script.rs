@@ -8,7 +8,7 @@ use super::tree::{Content, MOST_NODES, Mistake, Node};
 use crate::deck::Source;
 use crate::expression::{Expression, Variable};
 
-/// Maximum depth of variables that refer to other variables, and of files that include other files.
+/// Maximum nesting depth of variables that refer to other variables, and of included files.
 const DEEPEST: usize = 32;
 
 /// Maximum length of a command after substitution, bytes.
@@ -19,8 +19,8 @@ const LONGEST: usize = 1 << 16;
 pub struct Command {
     /// Words of the command, without quotes and with variables replaced.
     pub words: Vec<String>,
-    /// Node under which the log stores the outcome of the command. For a command of an included file, the
-    /// line is that of `include` in the script.
+    /// Node under which the log stores the outcome of the command. If the command is from an included file,
+    /// the line of the node is that of the `include` in the script.
     pub node: Node,
     /// File and line of a command of an included file, such as `supports.in:3`.
     origin: Option<String>,
@@ -32,7 +32,8 @@ impl Command {
         &self.words[0]
     }
 
-    /// Return the name of the command, after file and line if the command is from an included file.
+    /// Return the name of the command. If the command is from an included file, file and line precede the
+    /// name.
     pub fn key(&self) -> String {
         match &self.origin {
             Some(origin) => format!("{origin}: {}", self.name()),
@@ -55,8 +56,8 @@ pub struct Script {
     pub files: Vec<PathBuf>,
 }
 
-/// Default time steps of LAMMPS, by the name of the units and in these units. The first units are those of a
-/// script without the command `units`.
+/// Default time step of LAMMPS for each system of units, in the time unit of this system. The first entry
+/// applies to scripts without the command `units`.
 const DEFAULT_STEPS: [(&str, f64); 8] = [
     ("lj", 0.005),
     ("real", 1.0),
@@ -102,7 +103,7 @@ pub fn is_script(text: &str) -> bool {
 /// `folder`.
 ///
 /// # Errors
-/// - If an included file cannot be read, or included files are too deep.
+/// - If an included file cannot be read, or included files are nested too deeply.
 /// - If a quote or bracket is not closed.
 /// - If a variable is not defined.
 /// - If a formula in `$(…)` is invalid or changes with time.
@@ -118,9 +119,9 @@ pub fn parse(text: &str, folder: &Path) -> Result<Script, Mistake> {
 struct Included<'f> {
     /// Name of the file, as in the command `include`.
     name: &'f str,
-    /// Line in the script of the command that includes the file, or the file that includes this file.
+    /// Line of an `include` in the script: the one that includes this file, directly or through other files.
     line: usize,
-    /// Number of files that are being read.
+    /// Nesting depth of the file; 1 if the script itself includes it.
     depth: usize,
 }
 
@@ -171,8 +172,8 @@ fn words(text: &str) -> Result<Vec<String>, String> {
 }
 
 impl Script {
-    /// Add the commands of a text. `included` is the included file that has this text, `None` for the script
-    /// itself. `Err` holds the line in this text.
+    /// Add the commands of a text: of the included file `included`, or of the script itself if `included` is
+    /// `None`. The line in `Err` is a line of this text.
     fn read(
         &mut self,
         variables: &mut Variables,
@@ -197,7 +198,8 @@ impl Script {
         }
     }
 
-    /// Add the commands of the file that the command `include` on a line of a text names.
+    /// Add the commands of the included file `name`. `line` is the line of `include` in the text that
+    /// contains it; `included` is the included file with this text, `None` for the script.
     fn include(
         &mut self,
         variables: &mut Variables,

@@ -51,7 +51,7 @@ pub fn radius<const D: usize>(bond: &Bond<D>, tensor: &Symmetric<D>) -> Lanes {
     radius_of(quadratic_form(bond, tensor))
 }
 
-/// Same as [`radius`], from n·T n of eight bonds.
+/// Return the radii (n·T n)^(−½) of an ellipsoid from the values n·T n of eight bonds.
 #[inline(always)]
 pub fn radius_of(quadratic_form: Lanes) -> Lanes {
     // Padding bonds have n = 0. Without this limit, their radii would be infinite.

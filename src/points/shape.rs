@@ -36,8 +36,8 @@ pub fn bounds(shape: &Shape) -> ([f64; 3], [f64; 3]) {
 pub fn contains(shape: &Shape, position: [f64; 3], tolerance: f64) -> bool {
     match shape {
         Shape::Box { lower, upper } => (0..3).all(|k| {
-            // Boxes of 1-D and 2-D problems are flat along the other axes. A flat box always contains its own
-            // plane.
+            // In 1-D and 2-D problems, boxes are flat along the other axes. Along such an axis, a negative
+            // tolerance would exclude every position.
             let is_flat = lower[k] == upper[k];
             let tolerance = if is_flat { tolerance.abs() } else { tolerance };
             position[k] >= lower[k] - tolerance && position[k] <= upper[k] + tolerance

@@ -11,12 +11,12 @@ use crate::solver::Simulation;
 use crate::solver::conditions::members;
 
 /// Largest ratio of the thickness of a loaded layer to the depth of the load. A warning is printed if the
-/// ratio is larger. A layer one cell thick whose normal is a diagonal of the cells may contain two rows of
-/// cells, which together are up to √2 cells thick.
+/// ratio is larger. If the normal of a layer is a diagonal of the cells, a layer meant to be one cell thick
+/// may contain two diagonal rows of cells. Both rows together are up to √2 cells thick.
 const MAX_THICKNESS_RATIO: f64 = 1.6;
 
-/// Largest ratio of a row of cells to the shortest row through the same cell, if the row counts for the
-/// thickness of an inclined layer. Longer rows lie along the layer.
+/// Largest length of a row that counts for the thickness of a layer, divided by the length of the shortest
+/// row through the same cell. Longer rows lie along the layer, not across it.
 const MAX_ROW_RATIO: f64 = 1.5;
 
 /// Maximum number of points of a layer for which the thickness is checked.
@@ -265,9 +265,9 @@ fn thickness<const D: usize>(problem: &Problem, cells: Vec<[i64; 4]>) -> Option<
 }
 
 /// Return the thickness of a layer at one of its cells, in cells. `rows` contains the number of cells in the
-/// row through this cell along each axis. The row along the axis k through a layer of the thickness T with
-/// the unit normal n has the length L_k = T/|n_k|, so T = (Σ L_k⁻²)^(−1/2). The sum does not include rows that
-/// are longer than [`MAX_ROW_RATIO`] times the shortest row.
+/// row through this cell along each axis. Let T be the thickness of the layer and n its unit normal. The row
+/// along the axis k then has the length L_k = T/|n_k|, so T = (Σ L_k⁻²)^(−1/2). The sum does not include rows
+/// that are longer than [`MAX_ROW_RATIO`] times the shortest row.
 fn local_thickness(rows: &[f64]) -> f64 {
     let shortest = rows.iter().copied().fold(f64::INFINITY, f64::min);
     let across = rows.iter().filter(|row| **row <= MAX_ROW_RATIO * shortest);

@@ -245,7 +245,8 @@ pub(super) fn fix(
             })
         }
         ("addforce", _) => {
-            // A force of `atom_style peri` is a force density: LAMMPS divides it by the density.
+            // With `atom_style peri`, LAMMPS divides the force of an atom by the density, so this force is a
+            // force density.
             let force = vector(rest, 1.0).map_err(|m| wrong(translation, command, m))?;
             let zero = |value: Value| {
                 if value == Value::text("free") {

@@ -132,16 +132,17 @@ pub(super) fn write_set(
     written
 }
 
-/// Test whether a region contains an atom at the start of the run. Return `None` if the lattice is too large
-/// to know it.
+/// Test whether a region contains an atom at the start of the run. Return `None` if no atom is found, but the
+/// lattice is too large to test every site.
 pub(super) fn has_atoms(model: &Model, region: &Region) -> Option<bool> {
     let (mut atoms, is_complete) = atoms_in(model, region);
     let is_found = atoms.next().is_some();
     (is_found || is_complete).then_some(is_found)
 }
 
-/// Return the positions of the atoms in a region at the start of the run, and whether these are all atoms. If
-/// the region has more than `MOST_SITES` lattice sites, test only every n-th site in each direction.
+/// Return the positions of the atoms in a region at the start of the run, and whether the list is complete.
+/// If the region has more than `MOST_SITES` lattice sites, only every n-th site in each direction is tested,
+/// so the list is incomplete.
 pub(super) fn atoms_in<'m>(
     model: &'m Model,
     region: &'m Region,

@@ -31,8 +31,9 @@ fn horizon_index(law: &str) -> usize {
     if law == "pmb" { 1 } else { 2 }
 }
 
-/// Log the coefficients of bonds between atoms of different types. In the new deck, such a bond has the mean
-/// moduli of its ends and the smaller critical stretch.
+/// Log each `pair_coeff` for bonds between atoms of two different types. In the new deck, such a bond has the
+/// mean of the moduli of both types, and the smaller of both critical stretches. If the `pair_coeff` gives
+/// other values, a warning is printed.
 fn note_joints(translation: &Translation, model: &Model, kinds: &[u32], law: &str) {
     let first = horizon_index(law);
     let pairs = kinds

@@ -57,7 +57,7 @@ struct Model {
     fields: Vec<&'static str>,
 }
 
-/// Return the tree of a script. The keys of the tree are those of the commands.
+/// Return the tree of a script. The key of each command in the tree is its [`Command::key`].
 pub fn tree(script: &Script) -> Node {
     let commands = script.commands.iter();
     let entries = commands.map(|command| (command.key(), command.node.clone()));

@@ -300,7 +300,7 @@ pub(super) fn ignored(command: &Command) -> Option<&'static str> {
     }
 }
 
-/// Test whether a command that `if` may run has an effect on the results.
+/// Test whether an `if` may run a command that affects the results.
 fn has_effect(command: &Command) -> bool {
     let arguments = command.arguments();
     let mut words = arguments.iter().skip_while(|word| **word != "then");

@@ -1,13 +1,15 @@
-//! Atom types of LAMMPS that change: `set … type`.
+//! Changes of atom types in LAMMPS: `set … type`.
 
 use super::groups::{Group, find, has_atoms, named_region, region_of};
 use super::{Atoms, Model};
 use crate::import::regions::Region;
 
-/// Give the atoms that the arguments of `set` select the type `kind`. These atoms become bodies of their own.
+/// Set the type of the selected atoms to `kind`. `arguments` are the arguments of `set`, which select the
+/// atoms. If a region selects the atoms, the selected part of each body becomes a separate body.
 ///
 /// # Errors
-/// If the atoms are not known. `Err` holds the reason.
+/// If the import cannot find the selected atoms, or if the script has already defined a group of a type.
+/// `Err` holds the reason.
 pub(super) fn retype(model: &mut Model, arguments: &[&str], kind: u32) -> Result<(), &'static str> {
     if model
         .groups
@@ -74,5 +76,5 @@ pub(super) fn retype(model: &mut Model, arguments: &[&str], kind: u32) -> Result
     Ok(())
 }
 
-/// Reason for leaving out `set … type` of other atoms.
+/// Reason for leaving out a `set … type` whose atoms cannot be found.
 const NOT_KNOWN: &str = "types are those of all atoms, of a type, a region or a group of a region";

@@ -85,17 +85,18 @@ pub(super) fn read(
     Ok(())
 }
 
-/// Test whether a command sets the velocity of all atoms of a group because it names this group or `all`.
+/// Test whether a command applies to all atoms of a group: it names this group or `all`.
 fn is_of(velocity: &Velocity, group: &str) -> bool {
     velocity.group == group || velocity.group == "all"
 }
 
-/// Return the velocity that all atoms of a group have after the commands `velocity … set` so far. A
-/// component is `None` if it differs between the atoms. With `region`, only the atoms of the group in this
-/// region count.
+/// Return the velocity of the atoms of a group after the `velocity … set` commands read so far. A component
+/// is `None` if it differs between the atoms. With `region`, only atoms of the group that are in this region
+/// are used.
 ///
 /// # Errors
-/// If the atoms are not known. `Err` holds the reason.
+/// If the atoms of this group, or of the group of a command, cannot be found, or if there are no atoms. `Err`
+/// holds the reason.
 pub(super) fn velocities(
     model: &Model,
     group: &str,

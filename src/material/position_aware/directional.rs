@@ -9,8 +9,8 @@ use super::Fit;
 use super::conditions::{Conditions, of_product, one_in_directions, product, weighted_volume};
 use crate::material::ellipsoid;
 
-/// Return the tensors of the ellipsoids, and the arguments R, Q and τ of [`super::largest_ratio`]. The arguments
-/// are those of [`super::Form::fit`].
+/// Return the tensors of the ellipsoids, and R, Q and τ for [`super::largest_ratio`]. The parameters of this
+/// function are those of [`super::Form::fit`].
 pub fn fit<const D: usize>(
     [of_directions, of_squares]: [&[f64]; 2],
     [dilatational, deviatoric]: [&Conditions<D>; 2],

@@ -63,8 +63,9 @@ pub struct Fit<const D: usize> {
     products: [f64; 3],
 }
 
-/// Form of the functions ω and σ. A run-time choice of the form costs up to 5 % of the speed. A copy of all loops
-/// for each form would increase the build time.
+/// Form of the functions ω and σ. The form is a field of the law, not a type parameter. Selecting it at run
+/// time costs up to 5 % of the speed. With a type parameter, each form would have its own copy of all loops,
+/// which would increase the build time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Form {
     /// The functions of [`nearest`]; `surface_correction = "pals"`.
@@ -101,7 +102,8 @@ impl Form {
     /// Return ω (1/m⁵) and σ (N/m⁷) of eight bonds.
     #[inline(always)]
     fn of_bonds<const D: usize>(self, bond: &Bond<D>, (omega, sigma): &Functions<D>) -> [Lanes; 2] {
-        // Outside of the `match`, the compiler shares the products of this form between both ends of a bond.
+        // The quadratic form is computed before the `match`. The compiler can then compute its products of
+        // bond components once for both ends of a bond.
         let form_of_omega = quadratic_form(bond, omega);
         let omega = match self {
             Self::Nearest => form_of_omega,

@@ -27,8 +27,8 @@ const LARGEST: f64 = 30.0;
 /// of a cuboid, 0.007 in a sheet of two layers, and 0 in a single layer.
 const RANK: f64 = 5e-3;
 
-/// Return the tensors Λ of ω and S of σ, and the arguments R, Q and τ of [`super::largest_ratio`]. The
-/// arguments are those of [`super::Form::fit`].
+/// Return the tensors Λ of ω and S of σ, and R, Q and τ for [`super::largest_ratio`]. The parameters of this
+/// function are those of [`super::Form::fit`].
 pub fn fit<const D: usize>(
     [of_directions, of_squares]: [&[f64]; 2],
     [dilatational, deviatoric]: [&Conditions<D>; 2],

@@ -32,8 +32,9 @@ use crate::lanes::Lanes;
 /// Number of monomials of degree 6 in three variables.
 const MONOMIALS: usize = 28;
 
-/// Form of the function h. A run-time choice of the form costs up to 5 % of the speed. A copy of all loops
-/// for each form would increase the build time.
+/// Form of the function h. The form is a field of the law, not a type parameter. Selecting it at run time
+/// costs up to 5 % of the speed. With a type parameter, each form would have its own copy of all loops, which
+/// would increase the build time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Form {
     /// The function of [`tensor`]; `surface_correction = "tensor"`.

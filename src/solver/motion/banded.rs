@@ -1,10 +1,10 @@
 //! Symmetric band matrices and their Cholesky factor.
 
-/// A pivot above this fraction of the diagonal entry in its row is not round-off.
+/// A pivot above this fraction of the diagonal entry in its row is not round-off. The round-off of smaller
+/// pivots is estimated.
 const CERTAIN: f64 = 1e-4;
 
-/// Estimated round-off of a pivot, as a multiple of the machine precision times Σ A_kk x_k². See
-/// [`Banded::round_off`].
+/// Estimated round-off of a pivot, divided by ε Σ A_kk x_k². [`Banded::round_off`] defines ε, A and x.
 const ROUND_OFF: f64 = 4.0;
 
 /// A symmetric, positive semidefinite band matrix, or its Cholesky factor. The lower half of the band is
@@ -18,7 +18,7 @@ pub struct Banded {
     entries: Vec<f64>,
     /// 1/L_ii of the factor; 0 if the pivot is round-off.
     inverse: Vec<f64>,
-    /// Diagonal entries A_ii of the matrix that was factored.
+    /// Diagonal entries A_ii of the matrix before its factorization.
     diagonal: Vec<f64>,
 }
 
@@ -85,12 +85,15 @@ impl Banded {
         }
     }
 
-    /// Estimate the round-off of the pivot in a row, whose entries left of the diagonal are already factored.
+    /// Estimate the round-off of the pivot in a row. The entries of this row to the left of the diagonal must
+    /// already be factored.
     ///
-    /// The pivot is the smallest value of x·A x over all x with x_row = 1 and x = 0 below the row. The
-    /// round-off of the factorization changes A by about ε A_kk in each row k, with the machine precision ε.
-    /// It therefore changes the pivot by about ε Σ A_kk x_k². In a free body, x is a rotation about the nodes
-    /// below the row, so distant nodes have large x_k, and the pivot of the rotation is round-off.
+    /// The pivot is the smallest value of x·A x over all x with x_row = 1 and x = 0 below the row. In the
+    /// following, x is the vector at this minimum. The round-off of the factorization changes A by about ε
+    /// A_kk in each row k, with the machine precision ε. It therefore changes the pivot by about ε Σ A_kk
+    /// x_k². For the pivot that belongs to the rotation of a free body, x is a rotation about the nodes below
+    /// the row. Nodes far from these have large x_k, so the estimate is large and this pivot counts as
+    /// round-off.
     fn round_off(&self, row: usize) -> f64 {
         let width = self.band + 1;
         let mut x = vec![0.0; row + 1];

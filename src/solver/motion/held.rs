@@ -18,7 +18,7 @@ const ROUND_OFF: f64 = 1e-9;
 /// angle. The arm of a point is its position relative to the centroid of the piece.
 const SMALL_TORQUE: f64 = 0.01;
 
-/// For each axis, the components of the displacement in a rotation about this axis.
+/// For each axis, the two displacement components that a rotation about this axis changes.
 pub(super) const PLANES: [[usize; 2]; 3] = [[1, 2], [2, 0], [0, 1]];
 
 /// Loads on a piece along one axis. No support holds the piece along this axis.

@@ -366,8 +366,9 @@ impl<const D: usize> Simulation<'_, D> {
     /// # Errors
     /// If the load step has failed. In runs without contact, the message names a piece that is loaded along
     /// an axis, but that no support holds along this axis. In runs with contact, or if there is no such
-    /// piece, the message describes the unbalanced forces, or says that forces are not finite. With Newton's
-    /// method, it also names a piece whose supports leave rigid motions free.
+    /// piece, the message describes the unbalanced forces, or says that forces are not finite. If it
+    /// describes unbalanced forces of `static`, it also names a piece whose supports leave rigid motions
+    /// free, if there is one.
     pub(in crate::solver) fn check_equilibrium(&mut self) -> Result<()> {
         if !self.progress.load_step.has_failed {
             return Ok(());

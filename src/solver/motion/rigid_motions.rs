@@ -1,9 +1,9 @@
-//! Rigid motions of pieces of bodies that supports leave free.
+//! Number of rigid motions that the supports of a piece leave free.
 //!
 //! A support prescribes a component u_d of the displacement of a point. In a small rigid motion of the piece,
-//! u_d is a linear function of D translations and, in 2-D and 3-D, of the angles of rotation. Each prescribed
-//! component gives one row of coefficients. The number of free motions is the number of unknowns minus the
-//! rank of these rows.
+//! u_d is a linear function of D translations and, in 2-D and 3-D, of the angles of rotation. Translations
+//! and angles are the unknowns. Each prescribed component gives one row of coefficients of the unknowns. The
+//! number of free motions is the number of unknowns minus the rank of these rows.
 
 use crate::comm::ExactSum;
 use crate::comm::sum::reduce;
@@ -38,12 +38,12 @@ impl<const D: usize> Simulation<'_, D> {
         })
     }
 
-    /// Return the number of small rigid motions of a piece from its reference positions that its supports
-    /// leave free. An entry of `is_free` is 0 if a support prescribes this component of the point, otherwise
-    /// 1. Collective.
+    /// Return the number of rigid motions that the supports of a piece leave free. The motions are small
+    /// displacements from the reference positions. `is_free[d][point]` is 0 if a support prescribes the
+    /// displacement component d of the point, otherwise 1. Collective.
     fn count_free_motions(&self, piece: &Piece, is_free: &[Vec<f64>; D]) -> usize {
         let position = |point: &usize| self.model.position(*point);
-        // The largest coordinates, then the largest negative coordinates.
+        // The largest coordinates, then the smallest coordinates with the opposite sign.
         let mut bounds = [f64::NEG_INFINITY; 6];
         for position in piece.points.iter().map(position) {
             for d in 0..3 {
@@ -74,8 +74,8 @@ const fn motions(dimension: usize) -> usize {
     dimension * (dimension + 1) / 2
 }
 
-/// Return the coefficients of the displacement component `d` at `arm`, the position relative to the centre of
-/// the rotations: D for the translations, then one for each rotation.
+/// Return the coefficients of the displacement component `d`: D for the translations, then one for each
+/// rotation. `arm` is the position of the point relative to the centre of the rotations.
 fn coefficients<const D: usize>(arm: [f64; 3], d: usize) -> Vec<f64> {
     let translations = (0..D).map(|k| f64::from(u8::from(k == d)));
     let planes = PLANES.iter().filter(|plane| plane.iter().all(|k| *k < D));
