@@ -12,12 +12,7 @@ use crate::error::Result;
 use crate::mesh::{Format, GroupKey};
 use crate::message::format_number;
 use crate::points::{BodyPoints, Columns};
-use crate::problem;
-
-/// Largest number of bodies. Some tables have an entry for each pair of bodies. For example, the bond search
-/// reads the length of the longest bond of each pair. These tables grow with the square of the number of
-/// bodies.
-const MOST_BODIES: usize = 256;
+use crate::problem::{self, check::MOST_BODIES};
 
 /// Validate the bodies. `spacing` is the spacing in `[grid]`: the edges of a lattice cell, m.
 ///

@@ -6,11 +6,8 @@ use super::resolve::{Scope, find};
 use super::time::methods;
 use crate::deck::spanned::Spanned;
 use crate::error::Result;
+use crate::problem::check::RESTITUTION;
 use crate::problem::{self, ContactModel, ContactRule, FRICTION_IN_RELAXATION};
-
-/// Smallest allowed coefficient of restitution. With a smaller coefficient, the contact damping would require
-/// very short time steps.
-const LEAST_RESTITUTION: f64 = 0.01;
 
 /// Keys of a contact rule: the rule of `[contact]`, of a pair of bodies or of a rigid body.
 #[derive(Clone, Copy)]
@@ -154,8 +151,7 @@ pub(super) fn rule(
     let restitution = match keys.restitution {
         Some(number) => {
             let key = format!("{section} restitution");
-            let range = LEAST_RESTITUTION..1.0_f64.next_up();
-            scope.within(number, &key, range, "between 0.01 and 1")?
+            scope.allowed(number, &key, &RESTITUTION)?
         }
         None => 1.0,
     };

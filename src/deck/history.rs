@@ -11,6 +11,7 @@ use crate::component::{AXES, Component, entries, invariants};
 use crate::deck::spanned::Spanned;
 use crate::error::Result;
 use crate::message::format_number;
+use crate::problem::check::LARGEST_COSINE;
 use crate::problem::{self, Field, Interval};
 
 /// Validate the content and interval of the history; `horizon` is the horizon of the grid, m.
@@ -379,10 +380,6 @@ fn j_integral(
         layer,
     })
 }
-
-/// Largest |cos φ| that counts as perpendicular; φ is the angle between the crack front and the direction of
-/// growth.
-const LARGEST_COSINE: f64 = 1e-6;
 
 /// Return the direction of the crack front for a J integral in 3-D, `None` in plane problems.
 fn crack_front(

@@ -10,6 +10,7 @@ use crate::deck::spanned::Spanned;
 use crate::dimension::Dimension;
 use crate::error::Result;
 use crate::message::format_number;
+use crate::problem::check::{direction_fault, micromodulus_fault};
 use crate::problem::{self, DamageRule, InterfaceDamage, InterfacePair, InterfaceRule, Toughness};
 
 /// Value of `damage` for a pair whose bonds never break.
@@ -89,8 +90,13 @@ pub fn interface(
                 own.map_or(("[interface]", all), |(key, _, rule)| (key.as_str(), *rule));
             if *rule.get_ref() != Rule::None {
                 let pair = pair.map(|body| &bodies[body]);
-                one_direction(scope, pair)?;
-                one_micromodulus(scope, &format!("{key} rule"), rule, pair)?;
+                if let Some((body, fault)) = direction_fault(pair) {
+                    let message = format!("[body.{}] material: {fault}", body.name);
+                    return Err(scope.error(body.span.clone(), message));
+                }
+                if let Some(fault) = micromodulus_fault(self::rule(rule), pair) {
+                    return Err(scope.error(rule.span(), format!("{key} rule: {fault}")));
+                }
             }
         }
     }
@@ -236,55 +242,4 @@ fn pair(
         return Err(scope.error(second.span(), message));
     }
     Ok([a.min(b), a.max(b)])
-}
-
-/// Return an error if the laws of two bodies exert forces in different directions on a bond.
-fn one_direction(scope: &Scope, pair: [&problem::Body; 2]) -> Result<()> {
-    let law = |body: &problem::Body| body.material.law.declaration;
-    let linear = pair.into_iter().find(|body| law(body).linear);
-    let other = pair.into_iter().find(|body| !law(body).linear);
-    let (Some(linear), Some(other)) = (linear, other) else {
-        return Ok(());
-    };
-    let message = format!(
-        "[body.{}] material: bonds cannot join `{nonlinear}` and `{linear}`: the forces of `{linear}` act along the \
-         undeformed bond, the forces of `{nonlinear}` do not; give both bodies laws of the same kind, or set \
-         `rule = \"none\"` to omit the bonds between the bodies",
-        other.name,
-        nonlinear = law(other).name,
-        linear = law(linear).name,
-    );
-    Err(scope.error(other.span.clone(), message))
-}
-
-/// Check that the bodies allow a rule that needs one micromodulus for both ends of a bond (any rule but
-/// `own`). Return an error unless both bodies have the same bond-based law, and no key of the law is given as
-/// a function of the bond length.
-fn one_micromodulus(
-    scope: &Scope,
-    key: &str,
-    rule: &Spanned<Rule>,
-    pair: [&problem::Body; 2],
-) -> Result<()> {
-    let [first, second] = pair.map(|body| body.material.law.declaration.name);
-    let has_micromodulus = |body: &problem::Body| {
-        let law = &body.material.law;
-        !law.declaration.any_poisson_ratio && law.key_of_length().is_none()
-    };
-    if *rule.get_ref() == Rule::Own || first == second && pair.into_iter().all(has_micromodulus) {
-        return Ok(());
-    }
-    let with_key = |body: &problem::Body| {
-        let key = body.material.law.key_of_length();
-        key.map_or(String::new(), |key| format!(" with a `{key}`"))
-    };
-    let message = format!(
-        "{key}: this rule uses one micromodulus for both ends of a bond, so both bodies need the same bond-based law (a \
-         state-based law has no micromodulus), but [body.{}] is `{first}`{} and [body.{}] is `{second}`{}; use `own`",
-        pair[0].name,
-        with_key(pair[0]),
-        pair[1].name,
-        with_key(pair[1]),
-    );
-    Err(scope.error(rule.span(), message))
 }

@@ -15,8 +15,7 @@ use crate::error::Result;
 use crate::expression::Variable;
 use crate::material::{Declaration, Key, Kind, Value, declarations};
 use crate::message::suggestion;
-use crate::problem;
-use crate::problem::law;
+use crate::problem::{self, check::RATIO_TOLERANCE, law};
 
 /// Validate a material.
 ///
@@ -208,8 +207,7 @@ impl Section<'_> {
         if !bond_based || dimension.allows_any_poisson_ratio() {
             return Ok(found);
         }
-        // The tolerance accepts 0.33 and 0.333 for 1/3.
-        if (found.poisson_ratio - own).abs() > 0.005 {
+        if (found.poisson_ratio - own).abs() > RATIO_TOLERANCE {
             let others =
                 declarations().filter(|law| law.any_poisson_ratio && law.is_for(dimension));
             let other = match others.clone().count() {

@@ -3,10 +3,8 @@
 use super::grammar::{Deck, NamedTable};
 use super::resolve::Scope;
 use crate::deck::spanned::Spanned;
-use crate::error::{Result, excerpt};
-
-/// Largest number of characters of a name.
-const LONGEST: usize = 64;
+use crate::error::Result;
+use crate::problem::check::{column_fault, name_fault};
 
 /// Check the title and the names of all sections such as `[body.NAME]`.
 ///
@@ -24,14 +22,8 @@ pub fn names(scope: &Scope, deck: &Deck) -> Result<()> {
         span,
     } in deck.named_tables()
     {
-        let wrong = |c: char| c.is_control() || matches!(c, '"' | '\'' | '\\');
-        if name.is_empty() || name.contains(wrong) || name.chars().nth(LONGEST).is_some() {
-            let message = format!(
-                "[{section}]: the name {} must have 1 to {LONGEST} characters, and must not contain quotes, \
-                 backslashes or control characters",
-                excerpt(name)
-            );
-            return Err(scope.error(span, message));
+        if let Some(fault) = name_fault(name) {
+            return Err(scope.error(span, format!("[{section}]: {fault}")));
         }
     }
     Ok(())
@@ -42,11 +34,8 @@ pub fn names(scope: &Scope, deck: &Deck) -> Result<()> {
 /// # Errors
 /// On a name with `/`, `.` or `,`. These characters separate columns, or the parts of a column name.
 pub fn suits_a_column<T>(scope: &Scope, key: &str, name: &str, place: &Spanned<T>) -> Result<()> {
-    if name.contains(['/', '.', ',']) {
-        let message = format!(
-            "{key}: the name becomes part of column names, so it must not contain `/`, `.` or `,`"
-        );
-        return Err(scope.error(place.span(), message));
+    match column_fault(name) {
+        None => Ok(()),
+        Some(fault) => Err(scope.error(place.span(), format!("{key}: {fault}"))),
     }
-    Ok(())
 }

@@ -7,11 +7,7 @@ use super::sets::find_set;
 use crate::deck::spanned::Spanned;
 use crate::error::Result;
 use crate::message::format_number;
-use crate::problem;
-
-/// Text that marks old result files: a restart renames these files, and their new names contain this text.
-/// Names of further results must not contain this text, so that no new result replaces a renamed file.
-const SET_ASIDE: &str = "until_step_";
+use crate::problem::{self, check::file_fault};
 
 /// Validate the main result; `end` is the end of the run, s.
 ///
@@ -40,29 +36,9 @@ pub fn further_outputs(
     let tables = &deck.output.get_ref().further;
     let mut found: Vec<problem::Output> = Vec::new();
     for (name, table) in tables {
-        let wrong = |words: String| {
-            let message = format!("[output.{name}]: the name becomes part of a file name, {words}");
-            scope.error(table.span(), message)
-        };
-        if !name
-            .chars()
-            .all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-')
-        {
-            return Err(wrong(
-                "so it must have only the letters a to z and A to Z, digits, `_` and `-`"
-                    .to_owned(),
-            ));
-        }
-        if name.contains(SET_ASIDE) {
-            let words =
-                format!("so it must not contain `{SET_ASIDE}`, which marks files of older results");
-            return Err(wrong(words));
-        }
-        let mut names = found.iter().filter_map(|output| output.name.as_ref());
-        if let Some(other) = names.find(|other| other.eq_ignore_ascii_case(name)) {
-            return Err(wrong(format!(
-                "and differs from `{other}` only in upper and lower case, which some file systems ignore"
-            )));
+        let others = found.iter().filter_map(|output| output.name.as_ref());
+        if let Some(fault) = file_fault(name, others) {
+            return Err(scope.error(table.span(), format!("[output.{name}]: {fault}")));
         }
         found.push(of_table(scope, (Some(name), table.get_ref()), sets, end)?);
     }

@@ -7,10 +7,8 @@ use crate::deck::spanned::Spanned;
 use crate::error::Result;
 use crate::expression::{POSITION, POSITION_AND_TIME};
 use crate::message::format_number;
+use crate::problem::check::FINEST;
 use crate::problem::{self, InterfaceRule, PointSource};
-
-/// Largest refinement level; its spacing is 1/64 of the spacing of the grid.
-const FINEST: u64 = 6;
 
 /// Allowed values of the triggers `energy` and `damage`: above 0, up to 1.
 const SHARE: std::ops::Range<f64> = f64::MIN_POSITIVE..1.0 + f64::EPSILON;
@@ -105,21 +103,14 @@ fn trigger(
         let message = format!("{key}: give at least one of `energy`, `damage` and `where`");
         return Err(scope.error(table.span(), message));
     }
-    // The rank that owns a new point needs the parents of this point as owned points or ghosts. The parents
-    // may be a cell's diagonal apart, and ghosts are at most a horizon away. The horizon must therefore be at
-    // least the diagonal.
     for body in bodies {
-        if let PointSource::Lattice { spacing, .. } = body.points {
-            let edges = spacing[..scope.dimension].iter();
-            let diagonal = edges.map(|edge| edge * edge).sum::<f64>().sqrt();
-            if body.horizon < diagonal {
-                let message = format!(
-                    "{key}: the horizon of [body.{}] must be at least the diagonal of a cell, {} m",
-                    body.name,
-                    format_number(diagonal)
-                );
-                return Err(scope.error(table.span(), message));
-            }
+        if let Some(diagonal) = body.diagonal_above_horizon(scope.dimension) {
+            let message = format!(
+                "{key}: the horizon of [body.{}] must be at least the diagonal of a cell, {} m",
+                body.name,
+                format_number(diagonal)
+            );
+            return Err(scope.error(table.span(), message));
         }
     }
     let share = |number: &Option<Number>, name: &str| {

@@ -1,7 +1,7 @@
 //! Evaluation of the numbers, vectors and expressions of a deck.
 
 use std::cell::RefCell;
-use std::ops::{Range, RangeInclusive};
+use std::ops::Range;
 use std::sync::Arc;
 
 use indexmap::{IndexMap, IndexSet};
@@ -16,9 +16,7 @@ use crate::error::{Error, Result};
 use crate::expression::{Expression, POSITION_AND_TIME, Table, Variable};
 use crate::message::format_number;
 use crate::message::suggestion;
-
-/// Allowed lengths, m. Squares and volumes of these lengths do not overflow or underflow.
-const LENGTHS: RangeInclusive<f64> = 1e-30..=1e30;
+use crate::problem::check::{Allowed, LENGTH};
 
 /// Context for the evaluation of values: text, parameters, tables and dimension of the deck. In the methods,
 /// `key` is the section and key in error messages, such as `[time] end`.
@@ -119,19 +117,18 @@ impl<'a> Scope<'a> {
         self.within(number, key, f64::MIN_POSITIVE..f64::INFINITY, "above 0")
     }
 
-    /// Evaluate a length in m, within `LENGTHS`.
+    /// Evaluate a length in m.
     pub fn length(&self, number: &Number, key: &str) -> Result<f64> {
-        let length = self.positive(number, key)?;
-        if LENGTHS.contains(&length) {
-            return Ok(length);
-        }
-        let message = format!(
-            "{key}: must be between {:e} and {:e} m, is {}",
-            LENGTHS.start(),
-            LENGTHS.end(),
-            format_number(length)
-        );
-        Err(self.error(number.span(), message))
+        self.positive(number, key)?;
+        self.allowed(number, key, &LENGTH)
+    }
+
+    /// Evaluate a number that must be allowed.
+    pub(crate) fn allowed(&self, number: &Number, key: &str, allowed: &Allowed) -> Result<f64> {
+        let value = self.number(number, key)?;
+        let checked = allowed.check(key, value);
+        checked.map_err(|error| self.error(number.span(), error.message))?;
+        Ok(value)
     }
 
     /// Evaluate a number. Return an error if the value is outside `range`; `words` describes the range in the

@@ -6,14 +6,12 @@ use super::resolve::{Scope, find};
 use crate::deck::spanned::Spanned;
 use crate::error::Result;
 use crate::message::format_number;
+use crate::problem::check::MOST_HALVINGS;
 use crate::problem::{self, Method, StepRule};
 
 /// Relative tolerance for comparisons of times. Times that are equal in exact arithmetic can differ by
 /// round-off.
 const UP_TO_ROUNDING: f64 = 1e-9;
-
-/// Largest allowed value of `max_halvings`; 20 halvings divide a load step into about a million parts.
-const MOST_HALVINGS: u64 = 20;
 
 /// The run or a stage, with the keys of `[time]` or `[[stage]]`.
 struct TimeSegment<'a> {

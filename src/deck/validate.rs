@@ -169,21 +169,12 @@ fn volume_correction(
         Some(VolumeCorrection::Exact) | None => problem::VolumeCorrection::Exact,
     };
     let is_jittered = grid.jitter.is_some();
-    let without_cells = |body: &problem::Body| match &body.points {
-        problem::PointSource::File { .. } => Some("has its points from a file"),
-        problem::PointSource::Mesh { .. } => Some("has its points from a mesh"),
-        problem::PointSource::Lattice { .. } if body.has_gauss_points() => Some("has Gauss points"),
-        problem::PointSource::Lattice { .. } if is_jittered => {
-            Some("has points that `jitter` moves")
-        }
-        problem::PointSource::Lattice { .. } => body
-            .single_spacing(scope.dimension)
-            .is_none()
-            .then_some("has cells with edges of different lengths"),
-    };
-    let reason = bodies
-        .iter()
-        .find_map(|body| Some((&body.name, without_cells(body)?)));
+    let reason = bodies.iter().find_map(|body| {
+        Some((
+            &body.name,
+            body.no_cell_volume(is_jittered, scope.dimension)?,
+        ))
+    });
     let Some((name, reason)) = reason else {
         return Ok(correction);
     };

@@ -85,13 +85,17 @@ pub const POSITION_AND_TIME: [Variable; 4] = [Variable::X, Variable::Y, Variable
 pub const POSITION: [Variable; 3] = [Variable::X, Variable::Y, Variable::Z];
 
 impl Variable {
+    /// All variables.
+    pub(crate) const ALL: [Self; 5] = [Self::X, Self::Y, Self::Z, Self::T, Self::R];
+
     fn from_name(name: &str) -> Option<Self> {
-        [Self::X, Self::Y, Self::Z, Self::T, Self::R]
+        Self::ALL
             .into_iter()
             .find(|variable| variable.name() == name)
     }
 
-    fn name(self) -> &'static str {
+    /// Return the name in expressions.
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::X => "x",
             Self::Y => "y",

@@ -12,14 +12,26 @@ impl Table {
     /// Create a table of times (s) and values of the same count.
     ///
     /// # Errors
-    /// If there are fewer than two rows, the counts differ, or the times do not increase. The error holds
-    /// a message and the index of a row, counted from 0. If the times do not increase, the index belongs to
-    /// the first row whose time is not larger than the time of the row before it. For the other two errors,
-    /// it belongs to the last row.
+    /// If there are fewer than two rows, the counts differ, a number is not finite, or the times do not
+    /// increase. The error holds a message and the index of a row, counted from 0. If there are too few rows
+    /// or the counts differ, this is the index of the last row. Otherwise, it is the index of the first row
+    /// with a wrong number, or with a time that is not larger than the time of the row before it.
     pub fn new(times: Vec<f64>, values: Vec<f64>) -> Result<Self, (usize, String)> {
-        if times.len() < 2 || times.len() != values.len() {
+        let last = times.len().saturating_sub(1);
+        if times.len() != values.len() {
+            let (times, values) = (times.len(), values.len());
+            let message =
+                format!("needs as many values as times, has {times} times and {values} values");
+            return Err((last, message));
+        }
+        if times.len() < 2 {
             let message = format!("needs two rows or more, has {}", times.len());
-            return Err((times.len().saturating_sub(1), message));
+            return Err((last, message));
+        }
+        for (name, numbers) in [("time", &times), ("value", &values)] {
+            if let Some(row) = numbers.iter().position(|number| !number.is_finite()) {
+                return Err((row, format!("{name} must be finite, is {}", numbers[row])));
+            }
         }
         for (k, pair) in times.windows(2).enumerate() {
             if pair[1] <= pair[0] {
@@ -140,5 +152,32 @@ mod tests {
             "time must be larger than in the row before, 1.0, is 1.0"
         );
         assert!(Table::new(vec![0.0], vec![0.0]).is_err());
+    }
+
+    #[test]
+    fn rows_are_complete_and_finite() {
+        for (times, values, row, message) in [
+            (
+                vec![0.0, 1.0, 2.0],
+                vec![0.0, 1.0],
+                2,
+                "needs as many values as times, has 3 times and 2 values",
+            ),
+            (
+                vec![0.0, f64::NAN],
+                vec![0.0; 2],
+                1,
+                "time must be finite, is NaN",
+            ),
+            (
+                vec![0.0, 1.0],
+                vec![f64::INFINITY, 0.0],
+                0,
+                "value must be finite, is inf",
+            ),
+        ] {
+            let wrong = Table::new(times, values).unwrap_err();
+            assert_eq!(wrong, (row, message.to_owned()));
+        }
     }
 }

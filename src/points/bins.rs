@@ -144,11 +144,19 @@ impl Bins {
 
 /// Return the edge (m) of boxes, and the number of boxes per direction. The edge is at least `min_edge` (m).
 /// The total number of boxes is at most twice the number of points (`points`), plus 64.
+///
+/// # Panics
+/// If the edge is not above 0 or a corner is not finite. The search for the edge would not end.
 pub fn boxes(lower: [f64; 3], upper: [f64; 3], min_edge: f64, points: usize) -> (f64, [usize; 3]) {
+    let extents: [f64; 3] = std::array::from_fn(|k| (upper[k] - lower[k]).max(0.0));
+    let is_finite = extents.iter().all(|extent| extent.is_finite());
+    assert!(
+        min_edge > 0.0 && is_finite,
+        "boxes with the edge {min_edge} m over the extents {extents:?} m"
+    );
     let mut edge = min_edge * (1.0 + 1e-6);
     loop {
-        let counts: [f64; 3] =
-            std::array::from_fn(|k| ((upper[k] - lower[k]).max(0.0) / edge).floor() + 1.0);
+        let counts = extents.map(|extent| (extent / edge).floor() + 1.0);
         if counts.iter().product::<f64>() <= 2.0 * points as f64 + 64.0 {
             return (edge, counts.map(|count| count as usize));
         }

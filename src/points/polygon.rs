@@ -87,6 +87,11 @@ impl Polygon {
         }
     }
 
+    /// Return the vertices in order, m.
+    pub fn vertices(&self) -> &[[f64; 2]] {
+        &self.vertices
+    }
+
     /// Return the lower and the upper corner of the box around the polygon, m.
     pub fn bounds(&self) -> ([f64; 2], [f64; 2]) {
         (self.lower, self.upper)

@@ -65,6 +65,39 @@ impl Body {
         }
     }
 
+    /// Return the reason why the volumes of the points cannot be corrected at the edge of a family; `None` if
+    /// the points are the centres of square or cubic cells. `is_jittered` tells whether the problem has a
+    /// jitter.
+    pub(crate) fn no_cell_volume(
+        &self,
+        is_jittered: bool,
+        dimension: usize,
+    ) -> Option<&'static str> {
+        match &self.points {
+            PointSource::File { .. } => Some("has its points from a file"),
+            PointSource::Mesh { .. } => Some("has its points from a mesh"),
+            PointSource::Lattice { .. } if self.has_gauss_points() => Some("has Gauss points"),
+            PointSource::Lattice { .. } if is_jittered => Some("has points that `jitter` moves"),
+            PointSource::Lattice { .. } => self
+                .single_spacing(dimension)
+                .is_none()
+                .then_some("has cells with edges of different lengths"),
+        }
+    }
+
+    /// Return the diagonal of a lattice cell (m) if it is longer than the horizon, otherwise `None`.
+    /// Refinement during a run needs a shorter diagonal. The rank that owns a new point needs the parents of
+    /// this point as owned points or ghosts. The parents may be a diagonal apart, and ghosts are at most a
+    /// horizon away.
+    pub(crate) fn diagonal_above_horizon(&self, dimension: usize) -> Option<f64> {
+        let PointSource::Lattice { spacing, .. } = self.points else {
+            return None;
+        };
+        let edges = spacing[..dimension].iter();
+        let diagonal = edges.map(|edge| edge * edge).sum::<f64>().sqrt();
+        (self.horizon < diagonal).then_some(diagonal)
+    }
+
     /// Return the rule for the positions of the points in a cell. For points from a file or a mesh,
     /// return [`Quadrature::Midpoint`].
     pub fn quadrature(&self) -> Quadrature {

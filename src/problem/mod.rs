@@ -1,4 +1,5 @@
-//! The validated description of a run: all values are checked, and all names are resolved.
+//! The description of a run, with resolved names. A deck produces a problem with valid values;
+//! [`Problem::check`] checks the values of a problem that is built or changed in Rust.
 //!
 //! Spans are byte ranges of the deck from which a problem was read. They are used only in errors and
 //! warnings.
@@ -8,6 +9,7 @@
 mod blocks;
 mod bodies;
 mod build;
+pub(crate) mod check;
 mod conditions;
 mod contact;
 pub mod law;

@@ -3,10 +3,10 @@
 use super::{PointSource, Problem, Shape, StepRule};
 
 /// Create a problem that contains only the body with index `body`. Omit the body's no-failure sets, scatter
-/// and damping. Return the problem and the edges of the cells of the body (m). `None` if the points of the
-/// body are not on a lattice.
+/// and damping. Return the problem and the edges of the cells of the body (m). `None` if no body has this
+/// index, or if the points of the body are not on a lattice.
 pub fn single_body(problem: &Problem, body: usize) -> Option<(Problem, [f64; 3])> {
-    let mut body = problem.bodies[body].clone();
+    let mut body = problem.bodies.get(body)?.clone();
     let PointSource::Lattice { spacing, .. } = body.points else {
         return None;
     };

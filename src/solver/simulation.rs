@@ -40,7 +40,7 @@ const SLACK: f64 = 1e-5;
 
 /// The part of a run on one rank.
 pub struct Simulation<'a, const D: usize> {
-    /// The validated problem.
+    /// The problem.
     pub problem: &'a Problem,
     /// Communication with the other ranks.
     pub comm: &'a dyn Communicator,
@@ -155,6 +155,7 @@ impl<'a, const D: usize> Simulation<'a, D> {
     /// # Errors
     /// If the problem cannot be run, for example in these cases:
     ///
+    /// - The problem has not `D` dimensions, or a value is not allowed ([`Problem::check`]).
     /// - The points cannot be created.
     /// - The set of a condition contains no points.
     /// - There is no stable step.
@@ -176,6 +177,8 @@ impl<'a, const D: usize> Simulation<'a, D> {
         between: &mut dyn FnMut() -> Result<()>,
     ) -> Result<Self> {
         let start = Instant::now();
+        problem.check_dimension(D)?;
+        problem.check()?;
         laws_are_possible(problem)?;
         refinement::is_possible(problem)?;
         problem.check_contact()?;

@@ -32,11 +32,13 @@ pub struct Interior {
     pub exact: [f64; 2],
 }
 
-/// Compute the properties of a lattice body from a small block of the lattice. The result is `None` if the
-/// points are not on a lattice, if the families are so large that the block has too many bonds, or if the
-/// block cannot be set up.
+/// Compute the properties of a lattice body from a small block of the lattice. The result is `None` if a
+/// value of the problem is not allowed, if no body has this index, or if the points are not on a lattice. It
+/// is also `None` if the families are so large that the block has too many bonds, or if the block cannot be
+/// set up.
 pub fn interior(problem: &Problem, body: usize) -> Option<Interior> {
-    if !problem.bodies[body].is_on_lattice(problem.jitter) {
+    problem.check().ok()?;
+    if !problem.bodies.get(body)?.is_on_lattice(problem.jitter) {
         return None;
     }
     let block = block(problem, body)?;

@@ -13,8 +13,10 @@ pub use separation::separation_energy_ratio;
 /// these ratios.
 ///
 /// # Errors
-/// If the ratio of a body cannot be computed or is not above 0.
+/// If a value of the problem is not allowed ([`Problem::check`]). If the ratio of a body cannot be computed
+/// or is not above 0.
 pub fn calibrated(problem: &Problem) -> Result<Cow<'_, Problem>> {
+    problem.check()?;
     let mut calibrated = Cow::Borrowed(problem);
     for (index, body) in problem.bodies.iter().enumerate() {
         let rule = body.damage.as_ref().map(|damage| damage.rule);

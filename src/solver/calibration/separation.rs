@@ -41,6 +41,7 @@ const CHECK_INTERVAL: u32 = 20;
 ///
 /// The result is `None` in these cases:
 ///
+/// - a value of the problem is not allowed ([`Problem::check`]), or no body has this index;
 /// - the body has no fracture energy, or is on no lattice;
 /// - the block cannot have the law or the damage of the body;
 /// - bonds break by stress;
@@ -48,6 +49,7 @@ const CHECK_INTERVAL: u32 = 20;
 /// - the simulation of the block cannot be set up;
 /// - the block does not separate.
 pub fn separation_energy_ratio(problem: &Problem, body: usize, angle: f64) -> Option<f64> {
+    problem.check().ok()?;
     let (mut block, spacing) = single_body(problem, body)?;
     laws_are_possible(&block).ok()?;
     let fracture_energy = fracture_energy(problem, body, unit(normal(problem.dimension.count())))?;
