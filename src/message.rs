@@ -1,5 +1,14 @@
 //! Parts of messages: numbers in short form, and suggestions for misspelled names.
 
+/// Name of the option that continues a run. The command replaces the names of options by its own.
+pub const RESTART: &str = "`Existing::Continue`";
+
+/// Name of the option that replaces the files of a run.
+pub const REPLACE: &str = "`Existing::Replace`";
+
+/// Name of the option that sets the folder of a run.
+pub const FOLDER: &str = "`Options::folder`";
+
 /// Maximum length of the names that [`nearest`] compares, bytes.
 const LONGEST_NAME: usize = 64;
 

@@ -19,6 +19,7 @@ mod command {
     mod generate;
     mod library;
     mod pictures;
+    mod problems;
     mod readers;
     mod sweep;
 }

@@ -8,7 +8,8 @@ use std::time::Instant;
 use fissure::comm::mpi::World;
 use fissure::comm::{Communicator, agree};
 use fissure::deck;
-use fissure::error::Result;
+use fissure::error::{Error, Result};
+use fissure::message::{FOLDER, REPLACE, RESTART};
 use fissure::run::{Existing, Message, Observer, Options, Outcome, Reason, RunState, Signals};
 use fissure::solver::refinement::Regridded;
 use fissure::solver::repartition::Repartition;
@@ -92,7 +93,7 @@ fn run_deck(
         started,
         progress: Progress::Silent,
     };
-    let outcome = fissure::run(&problem, world, options, &mut log)?;
+    let outcome = fissure::run(&problem, world, options, &mut log).map_err(with_own_options)?;
     if prints {
         report(&outcome, threads, verbosity);
     }
@@ -100,6 +101,21 @@ fn run_deck(
         print_stop(&outcome, reason);
     }
     Ok(outcome)
+}
+
+/// Return an error of the library with the options of the command in place of those of the library.
+fn with_own_options(error: Error) -> Error {
+    let names = [
+        (RESTART, "--restart"),
+        (REPLACE, "--overwrite"),
+        (FOLDER, "--output DIR"),
+    ];
+    let replace =
+        |message: String, (of_library, own): (&str, &str)| message.replace(of_library, own);
+    Error {
+        message: names.into_iter().fold(error.message, replace),
+        ..error
+    }
 }
 
 /// Observer that prints the messages and the progress of a run.

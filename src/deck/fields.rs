@@ -5,9 +5,6 @@ use super::resolve::{Scope, find};
 use crate::error::Result;
 use crate::problem::Field;
 
-/// Names of the fields that results contain without request.
-const ALWAYS_WRITTEN: [&str; 4] = ["id", "block", "volume", "level"];
-
 /// Find a field for the list `fields` of a result.
 ///
 /// # Errors
@@ -39,12 +36,15 @@ pub fn history_field(scope: &Scope, name: &Text, key: &str) -> Result<Field> {
 
 /// Find a field among `fields` by name.
 fn find_field(scope: &Scope, name: &Text, fields: &[Field], key: &str) -> Result<Field> {
-    if ALWAYS_WRITTEN.contains(&name.get_ref().as_str()) {
-        let reason = "is written to results without request and cannot be chosen";
-        return unsuitable(scope, name, fields, key, reason);
-    }
-    let names = fields.iter().map(|field| field.name());
-    Ok(fields[find(scope.source, name, names, key)?])
+    let reason = match name.get_ref().as_str() {
+        "id" | "block" | "volume" => "is written to results without request and cannot be chosen",
+        "level" => "is written to results of runs with `[refinement]` and cannot be chosen",
+        _ => {
+            let names = fields.iter().map(|field| field.name());
+            return Ok(fields[find(scope.source, name, names, key)?]);
+        }
+    };
+    unsuitable(scope, name, fields, key, reason)
 }
 
 /// Return an error for the name of a field that this key does not allow.

@@ -280,6 +280,7 @@ impl Variables {
                 let mut units = DEFAULT_STEPS.iter();
                 if let Some((_, step)) = units.find(|(name, _)| *name == words[1]) {
                     self.step = *step;
+                    self.has_step = false;
                 }
             }
             ("timestep", 2) => {

@@ -9,6 +9,7 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::comm::{Communicator, IdOrder, agree};
 use crate::error::{Error, Result};
+use crate::message::{REPLACE, RESTART};
 use crate::refine::NodeKey;
 use crate::solver::Simulation;
 use crate::solver::motion::{Saved, SavedBonds, SavedColumn};
@@ -221,14 +222,14 @@ impl Checkpoints {
         }
         Err(Error::input(match &damaged[..] {
             [] => format!(
-                "there is no checkpoint in {}; start without --restart",
+                "there is no checkpoint in {}; start without {RESTART}",
                 folder.display()
             ),
             [only] => format!(
-                "{only} is damaged, and there is no other checkpoint; --overwrite starts the run again"
+                "{only} is damaged, and there is no other checkpoint; {REPLACE} starts the run again"
             ),
             both => format!(
-                "both checkpoints are damaged, {}; --overwrite starts the run again",
+                "both checkpoints are damaged, {}; {REPLACE} starts the run again",
                 both.join(" and ")
             ),
         }))

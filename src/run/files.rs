@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use crate::error::{Error, Result};
+use crate::message::{FOLDER, REPLACE, RESTART};
 use crate::output::checkpoint::{Checkpoints, is_taken};
 use crate::problem::Problem;
 
@@ -100,12 +101,12 @@ impl Files {
             .find(|file| is_taken(file));
         if let (Some(file), false) = (existing, overwrite) {
             let restart = if Checkpoints::paths(&self.folder).any(|path| is_taken(&path)) {
-                "--restart continues the run, "
+                format!("{RESTART} continues the run, ")
             } else {
-                ""
+                String::new()
             };
             return Err(Error::input(format!(
-                "{} exists already; {restart}--overwrite replaces it, --output DIR writes elsewhere",
+                "{} exists already; {restart}{REPLACE} replaces it, {FOLDER} writes elsewhere",
                 file.display()
             )));
         }
@@ -115,12 +116,16 @@ impl Files {
     /// Create the folder and lock it until the returned file is dropped. Called on rank 0.
     ///
     /// # Errors
-    /// If the folder or its lock file cannot be created, the path is not UTF-8, or another run has locked
-    /// the folder.
+    /// If the folder or its lock file cannot be created, the path is empty or not UTF-8, or another run has
+    /// locked the folder.
     pub fn lock(&self) -> Result<fs::File> {
+        if self.folder.as_os_str().is_empty() {
+            let message = "the path of the output folder is empty; `.` is the working directory";
+            return Err(Error::input(message));
+        }
         if self.folder.to_str().is_none() {
             return Err(Error::input(format!(
-                "{}: the path of the output folder must be UTF-8; --output DIR writes elsewhere",
+                "{}: the path of the output folder must be UTF-8; {FOLDER} writes elsewhere",
                 self.folder.display()
             )));
         }
@@ -141,7 +146,7 @@ impl Files {
                 }
                 Err(fs::TryLockError::WouldBlock) => {
                     return Err(Error::input(format!(
-                        "another run is writing to {}; --output DIR writes elsewhere",
+                        "another run is writing to {}; {FOLDER} writes elsewhere",
                         self.folder.display()
                     )));
                 }

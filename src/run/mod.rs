@@ -51,6 +51,7 @@ use crate::comm::sum::{ExactSum, reduce};
 use crate::comm::{self, Communicator, agree, check_equal};
 use crate::deck::{Deck, Source};
 use crate::error::{Error, Result};
+use crate::message::RESTART;
 use crate::output::{self, Creation};
 use crate::problem::Problem;
 use crate::solver::calibration::calibrated;
@@ -108,7 +109,8 @@ pub fn start_mpi() -> Result<World> {
 /// # Errors
 /// The error is the same on all ranks. There is an error if:
 ///
-/// - the problem cannot be run;
+/// - a value of the problem is not allowed ([`Problem::check`]), or the problem cannot be run;
+/// - the problem differs from the deck in `options`, except in settings that a restart may change;
 /// - the ranks have different problems, decks or folders, or handle existing files differently;
 /// - a rank does not see the folder that rank 0 has created;
 /// - a signal stopped the run before the first step;
@@ -143,6 +145,9 @@ fn run_unlocated(
     let explained = options.deck.as_ref().map(Deck::explain).transpose();
     let explained = agree(comm, explained)?;
     check_inputs(problem, comm, options, explained.as_deref())?;
+    if let Some(deck) = &options.deck {
+        is_of_deck(problem, &deck.problem_on(comm)?)?;
+    }
     let files = Files::new(problem, options.folder.clone());
     // The folder is locked before any file changes, and until the end of the run.
     let prepared = match comm.rank() {
@@ -200,6 +205,21 @@ fn check_inputs(
         "handling of existing files",
         "--restart or --overwrite must be given to all ranks or to none",
     )
+}
+
+/// Check that a deck describes the problem that is run. The deck is stored for a restart in place of the
+/// problem.
+///
+/// # Errors
+/// If the problem differs from the problem of the deck in a setting that a restart must not change.
+fn is_of_deck(problem: &Problem, of_deck: &Problem) -> Result<()> {
+    match restart_compatibility::difference_from_deck(problem, of_deck) {
+        None => Ok(()),
+        Some(line) => Err(Error::input(format!(
+            "the problem differs from the deck in `Options::deck`, so a restart would not notice the change: {line}; change \
+             the deck, or set `Options::deck` to `None`"
+        ))),
+    }
 }
 
 /// Outcome of the time loop.
@@ -296,8 +316,10 @@ impl<'a> Job<'a> {
             return Ok(());
         }
         let then = match self.options.existing {
-            Existing::Continue => "the checkpoint is as it was, --restart continues",
-            Existing::Refuse | Existing::Replace => "nothing is computed yet, start it again",
+            Existing::Continue => format!("the checkpoint is as it was, {RESTART} continues"),
+            Existing::Refuse | Existing::Replace => {
+                "nothing is computed yet, start it again".to_owned()
+            }
         };
         Err(Error::stopped(format!(
             "stopped by a signal before the first step; {then}"

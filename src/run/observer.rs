@@ -143,12 +143,21 @@ pub trait RunState {
     fn ids(&self) -> &[u64];
 
     /// Return a component of the reference positions, m.
+    ///
+    /// # Panics
+    /// If `component` is not below [`Self::dimension`].
     fn reference(&self, component: usize) -> &[f64];
 
     /// Return a component of the displacements at the reached time, m.
+    ///
+    /// # Panics
+    /// If `component` is not below [`Self::dimension`].
     fn displacement(&self, component: usize) -> &[f64];
 
     /// Return a component of the velocities, m/s. The first request in a step needs one loop over the points.
+    ///
+    /// # Panics
+    /// If `component` is not below [`Self::dimension`].
     fn velocity(&mut self, component: usize) -> &[f64];
 
     /// Return the values of an output field such as [`Field::Damage`] or [`Field::ForceDensity`], in the unit
@@ -162,7 +171,8 @@ pub trait RunState {
 
     /// Write a checkpoint and stop the run before its end. A request by one rank stops all ranks. If the
     /// request is made in [`Observer::row`], the run stops at the step of this row. Otherwise, the run stops
-    /// later: after at most ten explicit steps, or after at most ten iterations of load steps.
+    /// later: after at most ten explicit steps, or after at most ten iterations of load steps. The row of step
+    /// 0 is an exception: the run stops after one explicit step, or after one iteration of a load step.
     fn stop(&mut self);
 
     /// Return the factor of a load in the next step; 1 unless an observer has set the factor. `None` if no

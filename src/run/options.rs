@@ -8,7 +8,8 @@ use crate::deck::Deck;
 
 /// Options of a run; equal on all ranks, except `signals`, `started` and `attributes`.
 pub struct Options {
-    /// Folder of the result, the history and the checkpoints; it is created if missing.
+    /// Folder of the result, the history and the checkpoints; it is created if missing. An empty path is an
+    /// error.
     pub folder: PathBuf,
     /// Handling of existing files in the folder.
     pub existing: Existing,
@@ -21,6 +22,7 @@ pub struct Options {
     pub signals: Option<Signals>,
     /// The deck; `None` for a problem that was built in Rust. Errors and warnings refer to lines of the deck.
     /// The result contains the text of the deck. A restart compares the deck with the deck of the checkpoint.
+    /// If the program has changed the physics of the deck's problem, this must be `None`.
     pub deck: Option<Deck>,
     /// Additional attributes of the result: name and text, such as the command line. The attributes of rank 0
     /// are used.

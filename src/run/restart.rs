@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use crate::comm::{Communicator, agree};
 use crate::error::{Error, Result};
-use crate::message::format_number;
+use crate::message::{FOLDER, format_number};
 use crate::output::checkpoint::{Checkpoints, Fingerprint, Header, read_header, read_saved};
 use crate::solver::Simulation;
 use crate::solver::simulation::Times;
@@ -26,7 +26,8 @@ pub struct Restart {
 ///
 /// # Errors
 /// - If there is no intact checkpoint.
-/// - If the checkpoint was written for a deck with other physics. The message lists the differences.
+/// - If the checkpoint was written for a deck or problem with other physics. The message lists the
+///   differences.
 /// - If the points, or the points of a set, differ from those for which the checkpoint was written.
 /// - If the end time of the run is not after the start of the last step before the checkpoint.
 pub fn restart<const D: usize>(
@@ -46,7 +47,8 @@ pub fn restart<const D: usize>(
     )?;
     if !lines.is_empty() {
         return Err(Error::input(format!(
-            "the deck differs in its physics from that of {}, so the run cannot be continued:\n  {}",
+            "the {} differs in its physics from that of {}, so the run cannot be continued:\n  {}",
+            restart_compatibility::subject(&physics),
             path.display(),
             lines.join("\n  ")
         )));
@@ -73,7 +75,7 @@ pub fn restart<const D: usize>(
     if *end <= clock.time_before() {
         let message = format!(
             "[time] end: must be after the checkpoint {}, which is at {} s, is {} s; give a later end, or start a \
-             new run in another folder with --output DIR",
+             new run in another folder with {FOLDER}",
             path.display(),
             format_number(clock.time()),
             format_number(*end)

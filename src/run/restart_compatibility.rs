@@ -2,7 +2,7 @@
 
 use crate::deck::{self, Source};
 use crate::error::Result;
-use crate::problem::{History, Output, Problem};
+use crate::problem::{Body, Calibration, DamageRule, History, Output, Problem};
 
 /// First line of the description of a problem without a deck.
 const WITHOUT_DECK: &str = "# a problem without a deck\n";
@@ -49,6 +49,39 @@ pub fn attribute(physics: &str) -> &'static str {
         "problem"
     } else {
         "deck_in_full"
+    }
+}
+
+/// Return the name for the settings that a run compares with those of its checkpoint: `deck` or `problem`.
+/// `described` is the description of the run.
+pub fn subject(described: &str) -> &'static str {
+    if described.starts_with(WITHOUT_DECK) {
+        "problem"
+    } else {
+        "deck"
+    }
+}
+
+/// Return the first difference between a problem and the problem of its deck, except in settings that a
+/// restart may change; `None` without a difference.
+pub fn difference_from_deck(problem: &Problem, of_deck: &Problem) -> Option<String> {
+    let [own, of_deck] = [problem, of_deck].map(|problem| {
+        let mut problem = problem.clone();
+        problem.bodies.iter_mut().for_each(forget_calibration);
+        describe(&problem, None)
+    });
+    listed_differences(&of_deck, &own).pop()
+}
+
+/// Remove the separation energy ratio of a body: a deck has none, but a caller may pass a calibrated problem.
+fn forget_calibration(body: &mut Body) {
+    let rule = body.damage.as_mut().map(|damage| &mut damage.rule);
+    if let Some(DamageRule::Energy {
+        calibration: Calibration::Opening(ratio),
+        ..
+    }) = rule
+    {
+        *ratio = None;
     }
 }
 

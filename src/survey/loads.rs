@@ -253,7 +253,17 @@ fn thickness<const D: usize>(problem: &Problem, cells: Vec<[i64; 4]>) -> Option<
         let inverse = cells
             .iter()
             .map(|cell| local_thickness(&cell.rows[..D]).recip());
-        let cells_deep = cells.len() as f64 / inverse.sum::<f64>();
+        // A layer that fills a box of cells lies along a face of the box, even if it is hardly wider than deep.
+        let volume = |cell: &Cell| cell.rows[..D].iter().product::<f64>();
+        let is_box = cells.iter().all(|cell| volume(cell) == cells.len() as f64);
+        let cells_deep = if is_box {
+            cells[0].rows[..D]
+                .iter()
+                .copied()
+                .fold(f64::INFINITY, f64::min)
+        } else {
+            cells.len() as f64 / inverse.sum::<f64>()
+        };
         let edge = problem.bodies[cells[0].index[0] as usize].single_spacing(D)?;
         Some([cells_deep * edge, edge])
     };

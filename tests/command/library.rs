@@ -194,6 +194,12 @@ fn a_run_from_rust_that_was_stopped_goes_on() {
             .contains("was `density: 2440.0,`, is `density: 2500.0,`"),
         "{error}"
     );
+    assert!(
+        error
+            .message
+            .starts_with("the problem differs in its physics"),
+        "{error}"
+    );
 
     // Other intervals do not change the physics.
     problem.checkpoint = fissure::problem::CheckpointRule::Simulation(Interval::Steps(100));

@@ -109,6 +109,18 @@ fn a_right_deck_makes_a_run() {
     }
 }
 
+/// Problems from Rust are checked by `Problem::check`, which must allow everything that a deck allows.
+#[test]
+fn the_problem_of_a_right_deck_passes_the_check() {
+    let warned = decks("tests/decks/warned");
+    let warned = warned.iter().map(|path| Source::read(path).unwrap());
+    for source in right_decks().into_iter().chain(warned) {
+        let problem = deck::parse(&source).unwrap_or_else(|error| panic!("{error}"));
+        let path = source.path.display();
+        (problem.check()).unwrap_or_else(|error| panic!("{path}: {error}"));
+    }
+}
+
 #[test]
 fn a_deck_with_its_defaults_written_out_is_the_same_deck() {
     for source in right_decks() {

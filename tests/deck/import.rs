@@ -2057,7 +2057,7 @@ fn atoms_of_lammps_end_at_the_box() {
     let folder = Folder::new("boundary");
     for (boundary, points) in [
         ("boundary s s s\n", 12),
-        ("boundary s m fs\n", 12),
+        ("boundary s m fs\n", 6),
         ("boundary f f f\n", 2),
         ("boundary sf s s\n", 8),
         ("boundary s p f\n", 3),

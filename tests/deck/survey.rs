@@ -243,6 +243,10 @@ fn layers_along_curved_and_oblique_faces() {
     assert_eq!(of_ring("hypot(x, y) > 23"), None);
     is_thick(of_ring("hypot(x, y) < 14"), 2.0);
     is_thick(of_ring("hypot(x, y) > 21"), 3.0);
+    let of_plate =
+        |place| thickness_of_layer::<2>("box = { lower = [0, 0], upper = [12, 8] }", place);
+    assert_eq!(of_plate("x < 1 && y < 1"), None);
+    is_thick(of_plate("x < 2 && y < 2"), 2.0);
     // A face along the diagonal of the cells; two rows of cells lie in a layer one cell thick.
     let triangle = "polygon.vertices = [[0, 0], [20.2, 0], [0, 20.2]]";
     let of_triangle = |place| thickness_of_layer::<2>(triangle, place);

@@ -167,7 +167,7 @@ pub(super) fn follow(
                     let name = format!("fix {}", arguments[0]);
                     translation.leave_out_load(node, "condition", &name, reason);
                 }
-                "unfix" if loads.contains(&arguments[0]) => {
+                "unfix" if arguments.first().is_some_and(|id| loads.contains(id)) => {
                     translation.leave_out_load(node, "condition", name, reason);
                 }
                 "velocity" | "displace_atoms" | "minimize" => {

@@ -84,7 +84,7 @@ pub(super) fn setup(
                 log.taken(node, "bodies are free")
             }
             // A word has one letter for both faces, or one letter for the lower and one for the upper face.
-            model.has_upper_face = Some(words.map(|word| word.ends_with(['s', 'm'])));
+            model.has_upper_face = Some(words.map(|word| word.ends_with('s')));
         }
         "atom_style" => log.taken(node, "points with volume and density"),
         "lattice" => {

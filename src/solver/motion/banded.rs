@@ -192,8 +192,8 @@ mod tests {
         }
     }
 
-    /// Assemble the stiffness of a free square of `count`² cells. Springs of stiffness 1 lie along the edges and
-    /// the diagonals of each cell.
+    /// Assemble the stiffness of a free square of `count`² cells. Springs of stiffness 1 lie along the edges
+    /// and the diagonals of each cell.
     fn free_square(count: usize) -> Banded {
         let nodes = count + 1;
         let mut matrix = Banded::zero(2 * nodes * nodes, 2 * nodes + 3);

@@ -388,8 +388,9 @@ impl<const D: usize> Simulation<'_, D> {
         let method = self.time_rule().method;
         let cause = if residual.is_finite() {
             let free_motions = match method {
-                Method::Static(_) => self.describe_free_motions(),
-                Method::Explicit | Method::Relaxation(_) => None,
+                // Contact can also hold pieces.
+                Method::Static(_) if self.contact.is_none() => self.describe_free_motions(),
+                _ => None,
             };
             format!(
                 "the unbalanced forces are still {residual:.1e} of {}{}. If the body can carry the loads, {}{}",

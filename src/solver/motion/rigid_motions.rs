@@ -56,16 +56,24 @@ impl<const D: usize> Simulation<'_, D> {
             .map(|d| bounds[d] + bounds[3 + d])
             .fold(0.0, f64::max);
         let size = if size > 0.0 { size } else { 1.0 };
-        let mut products = vec![ExactSum::ZERO; motions(D) * motions(D)];
+        let none = vec![ExactSum::ZERO; motions(D) * motions(D)];
+        let (mut possible, mut prescribed) = (none.clone(), none);
         for point in &piece.points {
             // The entries of an arm are between 1 and 2, so that none of them is round-off.
             let position = position(point);
             let arm = std::array::from_fn(|d| (position[d] + bounds[3 + d]) / size + 1.0);
-            for d in (0..D).filter(|d| is_free[*d][*point] == 0.0) {
-                add_products(&mut products, &coefficients::<D>(arm, d));
+            for d in 0..D {
+                let row = coefficients::<D>(arm, d);
+                add_products(&mut possible, &row);
+                if is_free[d][*point] == 0.0 {
+                    add_products(&mut prescribed, &row);
+                }
             }
         }
-        motions(D) - rank(motions(D), &reduce(self.comm, &mut products))
+        // A single point cannot rotate, and a straight row of points cannot rotate about itself.
+        let [possible, prescribed] = [&mut possible, &mut prescribed]
+            .map(|products| rank(motions(D), &reduce(self.comm, products)));
+        possible - prescribed
     }
 }
 
