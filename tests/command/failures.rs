@@ -103,13 +103,17 @@ fn ranks_with_different_copies_of_a_file() {
         .map(|k| format!("{} {} 1 0\n", k % 100, k / 100))
         .collect();
     let points = |last: &str| format!("{rows}99 1 {last} 0\n");
+    let values = |name: &str, last: &str| {
+        let rows: String = (0..199).map(|k| format!("{k} 0.1\n")).collect();
+        format!("id {name}\n{rows}199 {last}\n")
+    };
     let write = |copy: &str| {
         std::fs::create_dir_all(folder.join(copy)).unwrap();
         for (name, content) in [
             ("deck.toml", deck),
             ("points.txt", &points("1")),
             ("ids.txt", "3 4 5\n"),
-            ("values.txt", "id ux\n0 0.1\n199 0.1\n"),
+            ("values.txt", &values("ux", "0.1")),
         ] {
             folder.write(&format!("{copy}/{name}"), content);
         }
@@ -122,12 +126,8 @@ fn ranks_with_different_copies_of_a_file() {
     let other_contents = "rank 1 reads other contents than rank 0";
     for (name, content, message) in [
         ("points.txt", &points("2")[..], other_contents),
-        ("values.txt", "id ux\n0 0.1\n199 0.2\n", other_contents),
-        (
-            "values.txt",
-            "id uy\n0 0.1\n199 0.1\n",
-            "rank 1 has another",
-        ),
+        ("values.txt", &values("ux", "0.2"), other_contents),
+        ("values.txt", &values("uy", "0.1"), "rank 1 has another"),
         (
             "ids.txt",
             "3 4 6\n",
