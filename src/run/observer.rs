@@ -171,8 +171,8 @@ pub trait RunState {
 
     /// Write a checkpoint and stop the run before its end. A request by one rank stops all ranks. If the
     /// request is made in [`Observer::row`], the run stops at the step of this row. Otherwise, the run stops
-    /// later: after at most ten explicit steps, or after at most ten iterations of load steps. The row of step
-    /// 0 is an exception: the run stops after one explicit step, or after one iteration of a load step.
+    /// later: after at most ten explicit steps, or after at most ten iterations of load steps. The row of
+    /// step 0 is an exception: the run stops after one explicit step, or after one iteration of a load step.
     fn stop(&mut self);
 
     /// Return the factor of a load in the next step; 1 unless an observer has set the factor. `None` if no

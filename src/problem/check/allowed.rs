@@ -30,10 +30,12 @@ impl Allowed {
         if self.range.contains(&value) {
             return Ok(());
         }
+        let is_infinite = value == f64::INFINITY && *self.range.end() == f64::MAX;
+        let finite = if is_infinite { " and finite" } else { "" };
         let words = self.words;
         Err(wrong(
             key,
-            format!("must be {words}, is {}", format_number(value)),
+            format!("must be {words}{finite}, is {}", format_number(value)),
         ))
     }
 }

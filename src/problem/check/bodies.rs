@@ -5,6 +5,7 @@ use super::allowed::{
 };
 use super::{finite, shapes, wrong};
 use crate::error::Result;
+use crate::message::format_number;
 use crate::problem::{
     Body, Calibration, Damage, DamageRule, Material, PointSource, Problem, Toughness,
 };
@@ -56,16 +57,18 @@ fn points(problem: &Problem, body: &Body, section: &str) -> Result<()> {
         PointSource::File { .. } => return Ok(()),
     };
     let key = format!("{section} spacing");
-    for edge in &spacing[..problem.dimension.count()] {
+    for edge in spacing {
         LENGTH.check(&key, *edge)?;
-        if *edge > body.horizon {
-            let fault = format!(
-                "{edge} m is larger than the horizon {} m, so no point would have a neighbour; the horizon is usually \
-                 3 to 6 spacings",
-                body.horizon
-            );
-            return Err(wrong(&key, fault));
-        }
+    }
+    let mut edges = spacing[..problem.dimension.count()].iter();
+    if let Some(edge) = edges.find(|edge| **edge > body.horizon) {
+        let fault = format!(
+            "{} m is larger than the horizon {} m, so no point would have a neighbour; the horizon is usually 3 to 6 \
+             spacings",
+            format_number(*edge),
+            format_number(body.horizon)
+        );
+        return Err(wrong(&key, fault));
     }
     finite(&format!("{section} origin"), origin)?;
     shapes::shape(problem, &format!("{section} shape"), shape)

@@ -7,8 +7,8 @@ use crate::component::{AXES, Component, entries, invariants};
 use crate::error::Result;
 use crate::problem::{Field, JIntegral, Line, Problem, Reaction};
 
-/// Largest |cos φ| that counts as perpendicular; φ is the angle between the crack front and the direction of
-/// growth.
+/// Largest |cos φ| that counts as perpendicular; φ is the angle between the crack front and the direction
+/// of growth.
 pub(crate) const LARGEST_COSINE: f64 = 1e-6;
 
 /// Check the content and the interval of the history.

@@ -39,6 +39,7 @@ impl Problem {
         names::names(self)?;
         self.check_grid()?;
         bodies::bodies(self)?;
+        self.check_volume_correction()?;
         bonds::bonds(self)?;
         contact::contact(self)?;
         refinement::refinement(self)?;
@@ -103,6 +104,11 @@ impl Problem {
                 ));
             }
         }
+        Ok(())
+    }
+
+    /// Check that the volume correction is for the cells of all bodies.
+    fn check_volume_correction(&self) -> Result<()> {
         if self.volume_correction == VolumeCorrection::None {
             return Ok(());
         }

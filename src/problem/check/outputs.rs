@@ -3,6 +3,7 @@
 use super::allowed::{AT_LEAST_ONE, POSITIVE};
 use super::{at_least_one, file_fault, wrong};
 use crate::error::Result;
+use crate::message::format_number;
 use crate::problem::{CheckpointRule, Field, Interval, Output, Problem};
 
 /// Relative round-off by which the time of an output may exceed the end of the run.
@@ -48,6 +49,7 @@ fn result(problem: &Problem, output: &Output) -> Result<()> {
     let (key, end) = (format!("{section} times"), problem.time.end);
     let range = 0.0..=end * (1.0 + UP_TO_ROUNDING);
     if let Some(time) = output.times.iter().find(|time| !range.contains(time)) {
+        let [end, time] = [end, *time].map(format_number);
         let fault = format!("must be between 0 and {end} s (the end of the run), is {time} s");
         return Err(wrong(&key, fault));
     }
