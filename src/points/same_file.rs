@@ -12,8 +12,8 @@ use crate::error::{Error, Result};
 /// What the user must do if the copies differ, for messages.
 const RULE: &str = "all ranks must read the same file, on a file system that all nodes share";
 
-/// Check that the heading of a file, and the rows that start in each rank's part of its bytes, are those that
-/// rank 0 reads. Rank 0 reads the whole file, and each other rank its part. Collective.
+/// Check that all ranks read the same contents of a file. Rank 0 reads the whole file. Every other rank reads
+/// the heading and its own part of the rows, and compares both with what rank 0 reads there. Collective.
 ///
 /// # Errors
 /// If the file cannot be read; `unreadable` converts the error. If the contents differ; the message names the

@@ -73,7 +73,8 @@ impl<const D: usize> Simulation<'_, D> {
         // A single point cannot rotate, and a straight row of points cannot rotate about itself.
         let [possible, prescribed] = [&mut possible, &mut prescribed]
             .map(|products| rank(motions(D), &reduce(self.comm, products)));
-        possible - prescribed
+        // The round-off of `possible` is larger, because it contains more rows, so its rank may be too small.
+        possible.saturating_sub(prescribed)
     }
 }
 
